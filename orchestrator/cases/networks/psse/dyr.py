@@ -61,6 +61,7 @@ def machine_models(
     values: dict[tuple[int, str], dict[str, float]] = {key: {} for key in at}
     lines: dict[tuple[int, str], dict[str, int]] = {key: {} for key in at}
     left = {name.upper() for name in leaving_out}
+    _refuse_absent(leaving_out, records)
     labels = unit_labels(machines)
     of: dict[tuple[int, str], list[DynamicRecord]] = {key: [] for key in at}
     # machines whose own record no part stands for
@@ -141,6 +142,17 @@ def machine_models(
         for key in at
         if {"machine", "converter"} & {*parts[key]} and key not in following
     }
+
+
+def _refuse_absent(names: Sequence[str], records: Sequence[DynamicRecord]) -> None:
+    """Refuse names of models of which the file has no record: one that is misspelt would leave out nothing."""
+    there = {record.name for record in records}
+    for name in names:
+        if name.upper() not in there:
+            raise InputError(
+                f"dyr_leave_out names {name!r}, of which the file has no record; "
+                f"take it out, or choose from {', '.join(sorted(there))}"
+            )
 
 
 def _own_models(

@@ -1,7 +1,8 @@
 """Machines of a PSS/E RAW file, the voltages that they hold, and infinite buses at references without one."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 from orchestrator.cases.form.remedies import with_slack
 from orchestrator.cases.networks.psse.raw_network import POWER_FACTOR, Machine
@@ -31,14 +32,25 @@ _AT_LIMIT = 0.1  # Mvar by which a rounded QG may miss a limit
 
 
 def _limits(
-    record: Record, low: str, at: int, high: str, above: int, unit: str
+    record: Record,
+    low: str,
+    at: int,
+    high: str,
+    above: int,
+    unit: str,
+    doubt: Callable[[str], None] | None = None,
 ) -> tuple[float, float]:
-    """A least and a largest value, infinite where the file has no limit."""
+    """A least and a largest value, infinite where the file has no limit, or two that no value fits.
+
+    ``doubt``: takes the sentence about two limits that no value fits, which PSS/E reads as well."""
     least, most = record.number(at, low, -_NO_LIMIT), record.number(above, high, _NO_LIMIT)
     if least > most:
-        raise record.error(
-            f"the limit {low} is {least:g} {unit}, more than {high} of {most:g} {unit}; swap them"
-        )
+        if doubt is not None:
+            doubt(
+                f"the limit {low} is {least:g} {unit}, more than {high} of {most:g} {unit}: "
+                "neither limits the machine here; are the two swapped, or columns shifted?"
+            )
+        return -math.inf, math.inf
     return least if least > -_NO_LIMIT else -math.inf, most if most < _NO_LIMIT else math.inf
 
 
@@ -109,7 +121,8 @@ def read_machines(net: RawTables) -> tuple[Machine, ...]:
         rating = record.number(mbase, "MBASE [MVA]", net.raw.base_mva)
         if not rating > 0:
             raise record.error(f"MBASE is {rating:g} MVA; it must exceed 0")
-        least, most = _limits(record, "QB", 5, "QT", 4, "Mvar")
+        doubt = partial(net.changes.note, record.line)
+        least, most = _limits(record, "QB", 5, "QT", 4, "Mvar", doubt=doubt)
         remote = record.whole(7, "IREG", 0)
         if remote not in (0, bus):
             held = net.magnitudes[bus]
@@ -129,7 +142,7 @@ def read_machines(net: RawTables) -> tuple[Machine, ...]:
                 record.line, "step-up transformer within a generator's record: left out"
             )
         source = complex(record.number(mbase + 1, "ZR", 0.0), record.number(mbase + 2, "ZX", 1.0))
-        p_least, p_most = _limits(record, "PB", status + 3, "PT", status + 2, "MW")
+        p_least, p_most = _limits(record, "PB", status + 3, "PT", status + 2, "MW", doubt=doubt)
         feeds = record.number(2, "PG", 0.0)
         if not p_least <= feeds <= p_most and feeds <= rating:  # else the rating is asked about
             text = f"PG is {feeds:g} MW, beyond the machine's limits, PB = {p_least:g} and PT = {p_most:g} MW"

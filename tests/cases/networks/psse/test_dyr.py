@@ -133,6 +133,14 @@ def test_a_model_goes_at_the_users_word(tables):
     assert found["sg3"].exciter == "manual"  # a classical machine has no field winding
 
 
+def test_a_model_of_which_the_file_has_no_record_cannot_go(tables):
+    case = CASE.replace("[units]", '[units]\ndyr_leave_out = ["TGOV"]')
+    with pytest.raises(
+        CaseError, match=r"dyr_leave_out names 'TGOV', of which .* no record; take it"
+    ):
+        tables(DYR, case)
+
+
 def test_a_governor_that_goes_leaves_the_power_constant(tables):
     """As the table of missing models says, and as where the file has no record of one."""
     case = CASE.replace("[units]", '[units]\ndyr_leave_out = ["OLDGOV"]')

@@ -54,7 +54,8 @@ def test_comments_slashes_alone_and_double_quotes(tmp_path):
 
 def test_models_that_are_missing_are_one_table(tmp_path):
     many = "".join(f"{bus} 'URST5T' 1 0.1 /\n" for bus in (1, 2, 3))
-    text = refusal(tmp_path, CLASSICAL + many + "2 'LCFB1' 1 3 /\n3 'OWNGOV' 1 3 /\n")
+    many += "2 'LCFB1' 1 3 /\n3 'OWNGOV' 1 3 /\n"
+    text = refusal(tmp_path, CLASSICAL + many)
     rows = [
         line.split() for line in text.splitlines() if line.split()[:1] in (["URST5T"], ["LCFB1"])
     ]

@@ -52,7 +52,13 @@ RAWS = [
         "GENERATOR",
         "1,1,100,192.0,0",
         "1,1,100,0,192",
-        "line 20: the limit PB is 192 MW, more than PT of 0",
+        "the limit PB is 192 MW, more than PT of 0 MW: neither limits the machine here",
+    ),
+    (
+        "GENERATOR",
+        "300,-300,1.04",
+        "-400,-300,1.04",
+        "the limit QB is -300 Mvar, more than QT of -400 Mvar: neither limits the machine here",
     ),
     (
         "GENERATOR",
