@@ -8,7 +8,7 @@ from rich.markup import escape
 
 from orchestrator.core.asked import read_part
 from orchestrator.core.errors import NOT_MET, InputError
-from orchestrator.core.safe_files import made_folder
+from orchestrator.core.safe_files import made_folder, write_page
 from orchestrator.face.api.nyquist import Asked
 from orchestrator.face.cli.arguments import add_options
 from orchestrator.face.cli.by_point import by_point
@@ -29,6 +29,11 @@ def run(options: argparse.Namespace) -> int:
     if (options.parameter or options.distance) and not options.retune:
         raise InputError(
             "--parameter and --distance belong to --retune, which is not given; add it, or leave them out"
+        )
+    if options.html and (options.points or options.scr is None):
+        raise InputError(
+            "--html: the page has a slider of the short-circuit ratio; give --scr, the ratio in its middle, and no "
+            "--points"
         )
     asked = Asked(
         options.device,
@@ -64,6 +69,8 @@ def run(options: argparse.Namespace) -> int:
             else 0
         )
     found = _judge(options, asked, folder)
+    if options.html:
+        write_page(options.html, found.html())
     if options.json:
         print_json(found.as_json())
     else:

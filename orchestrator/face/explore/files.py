@@ -16,6 +16,7 @@ SCRIPTS = (
     "response.js",
     "study.js",
     "first.js",
+    "saved.js",
     "page.js",
 )
 STYLE = "page.css"

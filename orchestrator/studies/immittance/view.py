@@ -85,6 +85,12 @@ class Nyquist(NoTruth, ask=".verdict"):
         }
         return self.result.as_json() | {"retune": found}
 
+    def html(self) -> str:
+        """A page with a slider of the short-circuit ratio, where one was given."""
+        from orchestrator.studies.immittance.ratio_page import ratio_page  # noqa: PLC0415 - only where it is asked for
+
+        return ratio_page(self.result)
+
     def save_pictures(self, folder: str | Path) -> list[Path]:
         """Write the eigenloci and the matrices as PNG into a folder that exists; returns the paths."""
         from orchestrator.studies.immittance.pictures import draw  # noqa: PLC0415 - a second to import

@@ -362,6 +362,38 @@ def test_a_saved_page_moves_without_a_server(browser, tmp_path, capsys):
         content = json.loads(out[out.index("{") :])["scenarios"][0]
         assert [row[:2] for row in rows(view)] == shown(content["modes"])
         assert view.locator("#run").is_disabled()
+        halfway_between_two(view, slider)
+
+
+def halfway_between_two(view, slider):
+    """What is drawn there is the mean of both sides, marked as such, with its error; release goes to one of them."""
+    cell = next(one for one in view.evaluate("SAVED.cells") if one["at"]["gfor.pod_p.K"][1] == 200)
+    low, high = cell["at"]["gfor.pod_p.K"]
+    ends = [
+        view.evaluate("place => SAVED.answers[place].answer.modes.scenarios[0].modes", place)
+        for place in cell["corners"]
+    ]
+    means = [
+        sum(complex(end[k]["real"], end[k]["imag"]) for end, k in zip(ends, places, strict=True))
+        / 2
+        for places in cell["modes"]
+    ]
+    least = min(-100 * mean.real / abs(mean) for mean in means)
+    values = view.evaluate("SAVED.grid['gfor.pod_p.K']")
+    place = (values.index(low) + 0.5) / (len(values) - 1)
+    slider.evaluate(
+        "(one, x) => { one.value = Math.round(1000 * x); one.dispatchEvent(new Event('input')); }",
+        place,
+    )
+    said = view.locator("#verdict.estimated")
+    said.get_by_text("between computed values").wait_for()
+    shown_percent = float(re.search(r"≈ [\d.]+ Hz, ([\d.]+) %", said.inner_text())[1])
+    assert shown_percent == pytest.approx(least, abs=0.02)  # the slider has a thousand places
+    assert f"off by {cell['least']:g} points" in said.inner_text()
+    assert cell["least"] < 1
+    slider.evaluate("one => one.dispatchEvent(new Event('change'))")
+    view.locator("#verdict.good").wait_for()
+    assert view.evaluate("state.values['gfor.pod_p.K'] ?? 200") in (low, high)
 
 
 @needs_chromium

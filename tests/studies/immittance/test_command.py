@@ -1,6 +1,7 @@
 """``gfor fmu nyquist`` as it is typed, on files that the project makes."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -116,6 +117,27 @@ def test_at_a_short_circuit_ratio(tmp_path, capsys):
         gfor.nyquist(given, scr=1.5, rating="100 MVA", voltage="100 kV")
     assert main(["fmu", "nyquist", device, "--distance", "0.2"]) == 2
     assert "belong to --retune" in capsys.readouterr().err
+
+
+def test_a_page_has_a_slider_of_the_ratio(tmp_path, capsys):
+    """Its verdicts are those of the line, its distances those that are judged."""
+    device, network = files(tmp_path)
+    page, out = tmp_path / "page.html", ["--out", str(tmp_path / "out")]
+    at_source = ["--scr", "1.5", "--rating", "100 MVA", "--voltage", "100 kV", "--html", str(page)]
+    assert main(["fmu", "nyquist", device, *at_source, *out]) == 0
+    (text,) = re.findall(r'id="held">(.*?)</script>', page.read_text("utf-8"))
+    held = json.loads(text)
+    assert len(held["judged"]) == 25
+    verdicts = {one["verdict"] for one in held["judged"]}
+    assert {"stable", "unstable"} <= verdicts
+    for one in held["judged"]:
+        R, X = (1 / one["ratio"] / (1 + k * k) ** 0.5 for k in (10, 0.1))
+        right = "stable" if is_stable(PLANT, Line(R, X / OMEGA)) else "unstable"
+        assert one["verdict"] in (right, "not known")
+    assert held["off"] < 2e-3
+    capsys.readouterr()
+    assert main(["fmu", "nyquist", device, network, "--html", str(page), *out]) == 2
+    assert "give --scr" in capsys.readouterr().err
 
 
 def test_generator_sign(tmp_path):

@@ -1,6 +1,7 @@
 """Runs, tables of phasors and the contest's folders, with what is wrong in them."""
 
 import json
+import re
 from dataclasses import replace
 from html import escape
 
@@ -215,6 +216,7 @@ def test_the_page_shows_where_energy_flows(gfor, tmp_path, measured):
         part in text
         for part in ("map of energy flows", "Amplitude over the time", "Mean power of all signals")
     )
+    assert re.search(r'<b class="bad">[\d.]+ Hz: a forced oscillation, sg1 drives it</b>', text)
 
 
 def test_the_first_screen_is_the_answer(gfor, tmp_path, measured):

@@ -71,6 +71,7 @@ function paintMovers(anew = false) {
     return box;
   });
   again.addEventListener("click", () => { seen.movers = null; seen.firstOf = ""; firstScreen(); });
+  if (SAVED && !SAVED.movers) { $("movers-title").hidden = true; return; }
   if (!known) parts.push(make("p", { class: "soft" }, seen.moversReason || "The FMUs are being asked which values move this mode most …"));
   else if (!known.movers.length) parts.push(make("p", { class: "soft" }, seen.moversReason || `None of ${known.looked_at} values moves this mode.`));
   else parts.push(make("p", { class: "soft" }, SAVED ? "Each slider moves alone, over values that were computed. " : `By ∂λ/∂p of the running FMUs${known.looked_at < known.of && !seen.moversAgain ? `; ${known.looked_at} of ${known.of} values were looked at` : ""}. `, seen.moversAgain && !SAVED ? again : null));
@@ -153,6 +154,7 @@ function paintQuestions() {
     const on = (state.values[off] ?? original(off)) !== false;
     add(`What does ${off.replace(/\.enabled$/, "")} do?`, () => withValues({ [off]: !on }, `${off} = ${!on}`));
   }
+  for (const name of Object.keys(SAVED?.grid ?? {}).slice(0, 3)) add(`Which ${name} damps most?`, () => askBest(name));
   add("What is a mode?", whatAModeIs);
   $("questions").replaceChildren(...questions);
 }

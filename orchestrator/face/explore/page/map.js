@@ -84,7 +84,7 @@ function paintMap() {
     if (m.name) clip.append(draw("text", { x: x + 11, y: y - 8 }, m.name));
   });
   if (seen.estimate) seen.estimate.modes.forEach(m => { if (m) clip.append(draw("path", { class: "estimate", d: cross(f.x(m.real), f.y(m.hz), 7) })); });
-  if (seen.estimate) parts.push(draw("text", { class: "faint", x: PAD.left + 8, y: PAD.top + 14 }, "light: estimates from ∂λ/∂p, exact on release"));
+  if (seen.estimate) parts.push(draw("text", { class: "faint", x: PAD.left + 8, y: PAD.top + 14 }, SAVED ? "light: interpolated, computed on release" : "light: estimates from ∂λ/∂p, exact on release"));
   svg.replaceChildren(...parts);
   if (focused !== undefined) svg.querySelector(`[data-mode="${CSS.escape(focused)}"]`)?.focus({ preventScroll: true });
 }

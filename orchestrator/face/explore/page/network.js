@@ -30,7 +30,7 @@ function paintLabels() {
   const shown = { x0: lens.x + (lens.w - w) / 2, y0: lens.y + (lens.h - h) / 2, x1: lens.x + (lens.w + w) / 2, y1: lens.y + (lens.h + h) / 2 };
   group.replaceChildren(...placedTexts(names.labels, names.taken, 11 * scale, shown));
 }
-const flowOf = () => seen.answer?.modes.scenarios[0].power_flow ?? null;
+const flowOf = () => { const own = seen.answer?.modes.scenarios[0].power_flow ?? null; return SAVED ? SAVED.flows[own] ?? null : own; };
 function things(kind, name, label, ...children) {
   const group = draw("g", { class: `thing${element && element.kind === kind && element.name === name ? " chosen" : ""}`, tabindex: 0, role: "button", "aria-label": label, "data-thing": `${kind} ${name}` }, ...children);
   const pick = () => { element = { kind, name }; paintNetwork(); paintElement(); };
@@ -138,7 +138,7 @@ const isOn = name => (name ? (state.values[name] ?? parameterOf(name)?.value ?? 
 
 function paintElement() {
   const place = $("element"), d = seen.info?.diagram;
-  if (!element || !d) { place.replaceChildren(make("p", { class: "soft", title: "Drag a bus to where it belongs; zoom in for all names and flows. Buses: pink above 1.05 pu, orange below 0.95. Dashed red: open or out." }, "Arrows: how the chosen mode swings. Circles are machines, squares converters. Click a bus, line, unit or load to change it.")); return; }
+  if (!element || !d) { place.replaceChildren(make("p", { class: "soft", title: "Drag a bus to where it belongs; zoom in for all names and flows. Buses: pink above 1.05 pu, orange below 0.95. Dashed red: open or out." }, `Arrows: how the chosen mode swings. Circles are machines, squares converters. ${SAVED ? "Point at a bus, line, unit or load for its figures." : "Click a bus, line, unit or load to change it."}`)); return; }
   const error = make("p", { class: "bad", role: "alert" }), parts = [make("h3", {}, `${element.kind} ${element.name}`)];
   const onOff = (name, text) => {
     const tick = make("input", { type: "checkbox" });
@@ -189,6 +189,10 @@ function paintElement() {
     if (unit.out) parts.push(onOff(unit.out, "in service (what it feeds is shared by the others)"));
     its.addEventListener("click", () => { $("search").value = `${unit.name}.`; paintFound(); $("search").focus(); });
     parts.push(its);
+  }
+  if (SAVED) {
+    place.replaceChildren(parts[0], make("p", { class: "soft" }, "A saved page: only its sliders move. gfor explore opens the case live, where this can be changed."));
+    return;
   }
   place.replaceChildren(...parts, added, error);
 }

@@ -116,23 +116,6 @@ function listen() {
     if (told.progress) seen.timing[`said ${{ movers: MOVERS_WORK }[told.of] ?? "∂λ/∂p"}`] = told.progress;
   };
 }
-// Of a saved page, the answer that lies nearest in its grid.
-function savedAnswer(question) {
-  if (question.ask === "open") return SAVED.open;
-  if (question.ask === "parameters") return SAVED.parameters[question.scenario];
-  if (question.ask === "movers") return SAVED.movers ?? { reason: "This page has the sliders above." };
-  if (question.ask === "first") return SAVED.first;
-  if (question.ask !== "modes") return null;
-  const snapped = {};
-  for (const [name, values] of Object.entries(SAVED.grid)) {
-    const wanted = question.values[name] ?? SAVED.own[name] ?? original(name) ?? values[0];
-    snapped[name] = values.reduce((best, v) => (Math.abs(v - wanted) < Math.abs(best - wanted) ? v : best));
-    if (name in state.values) state.values[name] = snapped[name];
-  }
-  if (SAVED.movers) keepOneMoved(snapped);
-  return SAVED.answers.find(one => one.scenario === question.scenario && Object.entries(snapped).every(([n, v]) => one.values[n] === v))?.answer ?? null;
-}
-
 async function begin() {
   beginMap(); beginNetwork(); beginResponse(); beginFirst();
   seen.beginning = SAVED ? SAVED.beginning : await (await fetch("beginning")).json();
@@ -161,6 +144,7 @@ async function begin() {
   if (seen.beginning.recorded && !SAVED && !location.hash) state.tab = "response";
   openTab(TABS.includes(state.tab) && !$(`tab-${state.tab}`).hidden ? state.tab : "network");
   paintControls(); paintChosen(); paintPlots(); paintPin();
+  if (SAVED) { $("between").textContent = wordsOfError(); $("another").textContent = "Look up a value of the case"; }
   const opened = await ask("case", { ask: "open" });
   if (!opened) { $("verdict").textContent = ""; return; }
   seen.titles = opened.scenarios;

@@ -33,6 +33,14 @@ function scaleOf(p) {
   return { low, high, to: x => low + x * (high - low), from: v => (v - low) / (high - low) };
 }
 
+// The same room for each step between computed values.
+function scaleThrough(values) {
+  const last = values.length - 1, below = x => Math.max(0, Math.min(last - 1, x));
+  const to = x => { const k = below(Math.floor(x * last)); return last ? values[k] + (x * last - k) * (values[k + 1] - values[k]) : values[0]; };
+  const from = v => { const k = below(values.findLastIndex(one => one <= v)); return last ? (k + (v - values[k]) / (values[k + 1] - values[k])) / last : 0; };
+  return { low: values[0], high: values[last], to, from };
+}
+
 function paintControls() {
   const focused = document.activeElement?.closest?.(".control")?.dataset.name, kind = document.activeElement?.type;
   $("controls").replaceChildren(...state.controls.map(name => controlOf(name)));
@@ -46,9 +54,9 @@ function controlOf(name, mover = null) {
   const value = state.values[name] ?? p?.value;
   const error = make("span", { class: "error", role: "alert" });
   const away = make("button", { title: "back to the case's value", "aria-label": `take ${name} back` }, "×");
-  away.addEventListener("click", () => { state.controls = state.controls.filter(n => n !== name); setValue(name, null); paintControls(); });
+  away.addEventListener("click", () => { if (!SAVED) state.controls = state.controls.filter(n => n !== name); setValue(name, null); paintControls(); });
   const unit = p && p.unit !== "1" ? p.unit : "";
-  box.append(make("div", { class: "row" }, make("b", {}, name), make("span", { class: "grow" }), mover && !(name in state.values) ? null : away));
+  box.append(make("div", { class: "row" }, make("b", {}, name), make("span", { class: "grow" }), (mover || SAVED) && !(name in state.values) ? null : away));
   if (mover) box.append(make("p", { class: "effect" }, effectOf(mover)));
   if (p?.type === "Boolean") {
     const tick = make("input", { type: "checkbox", "aria-label": name });
@@ -63,14 +71,13 @@ function controlOf(name, mover = null) {
     });
     const row = make("div", { class: "row" }, field, make("span", { class: "soft" }, unit));
     if (p && typeof p.value === "number" && p.type === "Real") {
-      const held = SAVED?.grid[name], least = held && Math.min(...held), most = held && Math.max(...held);
-      const scale = held ? { low: least, high: most, to: x => least + x * (most - least), from: v => (v - least) / (most - least) } : scaleOf({ ...p, value: original(name) });
+      const held = SAVED?.grid[name], scale = held ? scaleThrough(held) : scaleOf({ ...p, value: original(name) });
       const slider = make("input", { type: "range", min: 0, max: 1000, step: 1, "aria-label": `${name}, from ${number(scale.low)} to ${number(scale.high)} ${unit}` });
       slider.value = typeof value === "number" ? Math.round(1000 * Math.min(1, Math.max(0, scale.from(value)))) : 0;
       const at = () => +scale.to(slider.value / 1000).toPrecision(4);
       for (const begin of ["pointerdown", "focus"]) slider.addEventListener(begin, () => wantSlopes(name));
       slider.addEventListener("input", () => { field.value = at(); estimateAt(name, at()); });
-      slider.addEventListener("change", () => { if (!SAVED?.movers) setValue(name, at(), error); });
+      slider.addEventListener("change", () => setValue(name, at(), error));
       row.prepend(slider);
     }
     box.append(row);
@@ -199,6 +206,7 @@ function finder({ now, bounds, valuesAt, apply, words }) {
 
 async function setValue(name, value, place = null) {
   const before = copyOf(state.values);
+  if (SAVED && value !== null) { seen.dragged = null; await setSaved(name, value); return; }
   if (value === null || (same(value, original(name)) && !(name in (seen.beginning?.values ?? {})))) delete state.values[name]; else state.values[name] = value;
   seen.moved = name;
   if (same(before, state.values)) { seen.estimate = null; paintMap(); paintTable(); return; }
@@ -222,7 +230,7 @@ async function wantSlopes(name) {
 }
 function estimateAt(name, value) {
   const begin = performance.now(), found = seen.slopes[slopeKey(name)];
-  if (SAVED) { seen.moved = name; state.values[name] = value; compute(); keepState(); return; }
+  if (SAVED) { dragSaved(name, value); return; }
   if (!found || found.eigenvalues.length !== seen.modes.length) { wantSlopes(name); return; }
   const modes = found.eigenvalues.map(([re, im], k) => {
     const slope = found.slopes[k];
@@ -244,7 +252,7 @@ function painted(begin, what) {
     seen.timing[`${what} ms`] = ms;
     document.body.dataset[what] = ms.toFixed(1);
     document.body.dataset[`${what}Count`] = +(document.body.dataset[`${what}Count`] ?? 0) + 1;
-    seen.timing.text = `${what === "exact" ? "modes computed and drawn" : "estimate drawn"} within ${ms < 1000 ? `${ms.toFixed(0)} ms` : `${(ms / 1000).toFixed(1)} s`}`;
+    if (!SAVED) seen.timing.text = `${what === "exact" ? "modes computed and drawn" : "estimate drawn"} within ${ms < 1000 ? `${ms.toFixed(0)} ms` : `${(ms / 1000).toFixed(1)} s`}`;
     tick();
   }, 0));
 }

@@ -117,7 +117,7 @@ def document(
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{escape(title)}</title><link rel="icon" href="data:,"><style>{_text("page.css")}{_footer(title)}</style></head>
 <body><main><header><h1>{escape(title)}</h1><div class="soft">{escape(kind)} · {made}</div></header>
-<nav>{links}</nav>{findings}{body}</main>
+{f"<nav>{links}</nav>" if len(content) > 1 else ""}{findings}{body}</main>
 <div id="tooltip" role="status"></div><script>{_text("page.js")}</script></body></html>
 """
 

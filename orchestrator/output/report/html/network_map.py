@@ -13,6 +13,7 @@ from orchestrator.core.arrays import Matrix
 WIDTH = 720
 HEIGHT = 480
 _MARGIN = 46
+_LABEL = 110  # from the right edge within which a name stands to the left of its bus
 _ROUNDS = 300
 _LABELS = 60  # so many buses at most have their names beside them; the pointer shows all
 
@@ -61,11 +62,14 @@ def network_map(
             f'data-tip="{escape(texts[bus])}"/>'
         )
         if len(buses) <= _LABELS:
+            side = -1 if x > WIDTH - _LABEL else 1
+            anchor = ' text-anchor="end"' if side < 0 else ""
             parts.append(
-                f'<text x="{x + 8 + 6 * share:.1f}" y="{y - 6:.1f}">{escape(labels(bus))}</text>'
+                f'<text x="{x + side * (8 + 6 * share):.1f}" y="{y - 6:.1f}"{anchor}>{escape(labels(bus))}</text>'
             )
+    height = _MARGIN + max((y for _, y in at.values()), default=HEIGHT - _MARGIN)
     return (
-        f'<svg class="chart" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(name)}">'
+        f'<svg class="chart" viewBox="0 0 {WIDTH} {height:.0f}" role="img" aria-label="{escape(name)}">'
         f"{''.join(parts)}</svg>"
     )
 

@@ -1,0 +1,79 @@
+"use strict";
+// A saved page: its answers were computed before; what lies between two of them is interpolated, and marked as such.
+const heldNear = (name, wanted) => SAVED.grid[name].reduce((best, v) => (Math.abs(v - wanted) < Math.abs(best - wanted) ? v : best));
+const ownOf = name => SAVED.beginning.values[name] ?? SAVED.own[name] ?? original(name) ?? SAVED.grid[name][0];
+
+// The answer that lies nearest in the grid; the state takes its values. Null where a value is asked for that has none.
+function savedAnswer(question) {
+  if (question.ask === "open") return SAVED.open;
+  if (question.ask === "parameters") return SAVED.parameters[question.scenario];
+  if (question.ask === "movers") return SAVED.movers ?? { reason: "This page has the sliders above." };
+  if (question.ask === "first") return SAVED.first;
+  if (question.ask !== "modes") return null;
+  const others = Object.keys(question.values).filter(name => !(name in SAVED.grid) && question.values[name] !== SAVED.beginning.values[name]);
+  if (others.length) { failed(`${others[0]} was not computed for this page; gfor explore opens the case live`); return null; }
+  const snapped = {};
+  for (const name of Object.keys(SAVED.grid)) {
+    snapped[name] = heldNear(name, question.values[name] ?? ownOf(name));
+    if (name in state.values) state.values[name] = snapped[name];
+  }
+  if (SAVED.movers) keepOneMoved(snapped);
+  return SAVED.answers.find(one => one.scenario === question.scenario && Object.entries(snapped).every(([n, v]) => one.values[n] === v))?.answer ?? null;
+}
+// While a slider is dragged: the nearest computed state, and over it what lies between.
+async function dragSaved(name, value) {
+  const begin = performance.now(), others = SAVED.movers ? [] : Object.keys(SAVED.grid).filter(one => one !== name);
+  const wanted = { [name]: value, ...Object.fromEntries(others.map(one => [one, state.values[one] ?? ownOf(one)])) };
+  Object.assign(seen, { moved: name, dragged: value });
+  state.values[name] = value;
+  await compute();
+  if (seen.dragged !== value) return;  // the slider went on
+  const cell = SAVED.cells.find(one => Object.entries(one.at).every(([key, [low, high]]) => key in wanted && low <= wanted[key] && wanted[key] <= high));
+  if (!cell || value === heldNear(name, value)) return;
+  const between = betweenOf(cell, wanted), corner = cell.corners.findIndex(place => SAVED.answers[place].answer === seen.answer);
+  seen.estimate = { name, value, modes: seen.modes.map((_, k) => between[cell.modes.findIndex(one => one[corner] === k)] ?? null) };
+  paintMap(); paintTable();
+  const least = [...between].sort((a, b) => a.damping - b.damping)[0];
+  $("verdict").className = "estimated";
+  $("verdict").textContent = `${name} = ${number(value)}, between computed values: least damped ≈ ${fixed(least.hz, 3)} Hz, ${fixed(least.damping, 2)} % (halfway it is off by ${number(cell.least, 2)} points, any mode by at most ${number(cell.most, 2)}); computed on release`;
+  painted(begin, "estimate");
+}
+// The followed modes of a cell, on straight lines between its corners.
+function betweenOf(cell, wanted) {
+  const parts = Object.entries(cell.at).map(([key, [low, high]]) => (wanted[key] - low) / (high - low));
+  const weights = cell.corners.map((_, c) => parts.reduce((all, part, k) => all * ((c >> (parts.length - 1 - k)) & 1 ? part : 1 - part), 1));
+  return cell.modes.map(places => {
+    const sum = key => places.reduce((all, k, c) => all + weights[c] * SAVED.answers[cell.corners[c]].answer.modes.scenarios[0].modes[k][key], 0);
+    const real = sum("real"), imag = sum("imag");
+    return { real, imag, hz: imag / 2 / Math.PI, damping: -100 * real / Math.hypot(real, imag) };
+  });
+}
+// On release, and where a number is typed: the nearest value that was computed.
+async function setSaved(name, value) {
+  const near = typeof value === "number" && name in SAVED.grid ? heldNear(name, value) : null;
+  if (near !== null) { seen.moved = name; if (near === ownOf(name)) delete state.values[name]; else state.values[name] = near; }
+  seen.estimate = null;
+  await compute();
+  keepState();
+  paintControls();
+  const error = document.querySelector(`.control[data-name="${CSS.escape(name)}"] .error`);
+  if (error && near === null) error.textContent = "give a number";
+}
+// How far what is drawn between computed values may be off: at values halfway, which were computed to know it.
+function wordsOfError() {
+  if (!SAVED.cells.length) return "";
+  const sorted = key => SAVED.cells.map(one => one[key]).sort((a, b) => a - b), least = sorted("least"), most = sorted("most"), last = most.length - 1;
+  return `While you drag, ≈ is interpolated: at ${most.length} values halfway, computed to know it, the least damped mode was off by ${number(least[last >> 1], 2)} points of damping as a rule and ${number(least[last], 2)} at most (any mode: ${number(most[last], 2)}). On release the nearest computed value is shown.`;
+}
+// A question that the answers of the page are enough for: which value of a slider damps most, the others as they are.
+function askBest(name) {
+  const others = SAVED.movers ? {} : Object.fromEntries(Object.keys(SAVED.grid).map(one => [one, heldNear(one, state.values[one] ?? ownOf(one))]));
+  const answerAt = value => { const at = SAVED.movers && value === ownOf(name) ? {} : { ...others, [name]: value }; return SAVED.answers.find(one => Object.keys(one.values).length === Object.keys(at).length && Object.entries(at).every(([n, v]) => one.values[n] === v))?.answer; };
+  const tried = SAVED.grid[name].map(value => ({ value, answer: answerAt(value) })).filter(one => one.answer && leastOf(one.answer.modes.scenarios[0].modes));
+  const damping = one => (one.answer.modes.scenarios[0].stable === false ? Math.min(-1e-9, leastOf(one.answer.modes.scenarios[0].modes).damping_percent) : leastOf(one.answer.modes.scenarios[0].modes).damping_percent);
+  const best = tried.reduce((one, other) => (damping(other) > damping(one) ? other : one)), unstable = tried.filter(one => one.answer.modes.scenarios[0].stable === false);
+  const show = make("button", {}, "show it");
+  show.addEventListener("click", () => setSaved(name, best.value));
+  const range = `${number(tried[0].value)} to ${number(tried.at(-1).value)}`;
+  sayElse(`Of ${tried.length} computed values of ${name} from ${range}, ${number(best.value)} damps most: ${swingOf(best.answer)}. `, unstable.length ? `Unstable at ${unstable.map(one => number(one.value)).join(", ")}. ` : "Stable at all of them. ", show);
+}

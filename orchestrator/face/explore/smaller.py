@@ -1,0 +1,66 @@
+"""Answers as a saved page holds them: what it draws, with the digits that it shows."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+_DIGITS = 7  # significant ones of a number; the page shows at most six
+_STATES = 8  # of a mode's participation, as many as the page has bars
+_COMPONENTS = 6  # of a mode's participation
+_SEEN = 0.02  # an arrow shorter than this part of the longest is not drawn
+_OF_SCENARIO = ("name", "stable", "warnings", "power_flow", "modes")
+_OF_ANSWER = ("title", "verdict", "outside", "warnings", "idle", "swings", "copied", "stamp")
+_LISTED = 1000  # parameters up to which a page lists all of them
+
+
+def smaller_answer(answer: Mapping[str, Any], flows: list[Any]) -> dict[str, Any]:
+    """Keep what the page draws of an answer to ``modes``. Its power flow becomes a place in ``flows``, to which it is
+    added where it is not there yet: most sliders move none."""
+    scenarios = [
+        {key: one[key] for key in _OF_SCENARIO if key in one}
+        | {"modes": [_smaller_mode(mode) for mode in one["modes"]]}
+        for one in answer["modes"]["scenarios"]
+    ]
+    kept = {key: answer[key] for key in _OF_ANSWER if key in answer}
+    for one in scenarios:
+        flow = rounded(one.get("power_flow"))
+        if flow not in flows:
+            flows.append(flow)
+        one["power_flow"] = flows.index(flow)
+    found: dict[str, Any] = rounded({**kept, "modes": {"scenarios": scenarios}})
+    return found
+
+
+def _smaller_mode(mode: Mapping[str, Any]) -> dict[str, Any]:
+    shape = mode.get("shape", [])
+    least = _SEEN * max((one["magnitude"] for one in shape), default=0.0)
+    components = [*mode.get("components", {}).items()]
+    return {
+        **mode,
+        "participation": mode.get("participation", [])[:_STATES],
+        "components": dict(components[:_COMPONENTS]),
+        "shape": [one for one in shape if one["magnitude"] > least],
+    }
+
+
+def rounded(content: Any) -> Any:
+    """The same content, each number with as many digits as a page needs."""
+    if isinstance(content, float):
+        return float(f"{content:.{_DIGITS}g}")
+    if isinstance(content, Mapping):
+        return {key: rounded(one) for key, one in content.items()}
+    if isinstance(content, list | tuple):
+        return [rounded(one) for one in content]
+    return content
+
+
+def smaller_parameters(answer: Mapping[str, Any], shown: Sequence[str]) -> dict[str, Any]:
+    """Leave out the parameters of a large case that are neither ``shown`` nor a switch that is off."""
+    rows = answer.get("parameters", [])
+    if len(rows) <= _LISTED:
+        return dict(answer)
+    switches = {one for row in rows if row["parameter"] in shown for one in row["switches"]}
+    wanted = {*shown, *switches}
+    return {
+        **answer,
+        "parameters": [row for row in rows if row["parameter"] in wanted or row["value"] is False],
+    }
