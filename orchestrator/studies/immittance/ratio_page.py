@@ -16,8 +16,8 @@ from orchestrator.studies.immittance.study import CutResult
 
 _COUNT = 25  # ratios that are judged before, equally far apart in ratio
 _WIDE = 4.0  # from the ratio that was asked for, divided by this, to as many times it
-_DIGITS = 6  # of a number that the page holds
-_POINTS = 2500  # of a locus that the page draws, at most
+_DIGITS = 5  # of a number that the page holds
+_POINTS = 1200  # of a locus that the page draws, at most
 
 
 @dataclass(frozen=True)
