@@ -91,14 +91,13 @@ def eigenvalues_of(answer: Answer) -> Complex:
 
 
 def followed_modes(corners: Sequence[Complex]) -> list[list[int]]:
-    """Of each mode of the first corner that has a partner at every other one, its places there."""
+    """Pair the modes of the corners: each that has a partner at every corner, with its places there."""
     first, *others = corners
-    places = [_partners(first, other) for other in others]
-    return [
-        [k, *(one[k] for one in places)]
-        for k in range(len(first))
-        if all(k in one for one in places)
-    ]
+    followed = [[k] for k in range(len(first))]
+    for other in others:
+        places = _partners(first, other)
+        followed = [[*one, places[one[0]]] for one in followed if one[0] in places]
+    return followed
 
 
 def _partners(one: Complex, other: Complex) -> dict[int, int]:

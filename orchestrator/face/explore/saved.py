@@ -158,8 +158,8 @@ def _own_values(axes: Sequence[Axis], known: Mapping[str, Any]) -> dict[str, flo
     found = {}
     for axis in axes:
         before = {known.get(key) for key in axis.sets(axis.values[0])}
-        if len(before) == 1 and (value := before.pop()) is not None:
-            found[axis.key] = float(value)
+        if len(before) == 1 and None not in before:
+            found[axis.key] = float(*before)
     return found
 
 

@@ -15,19 +15,19 @@ _LISTED = 1000  # parameters up to which a page lists all of them
 def smaller_answer(answer: Mapping[str, Any], flows: list[Any]) -> dict[str, Any]:
     """Keep what the page draws of an answer to ``modes``. Its power flow becomes a place in ``flows``, to which it is
     added where it is not there yet: most sliders move none."""
-    scenarios = [
-        {key: one[key] for key in _OF_SCENARIO if key in one}
-        | {"modes": [_smaller_mode(mode) for mode in one["modes"]]}
-        for one in answer["modes"]["scenarios"]
-    ]
+    scenarios = [_smaller_scenario(one, flows) for one in answer["modes"]["scenarios"]]
     kept = {key: answer[key] for key in _OF_ANSWER if key in answer}
-    for one in scenarios:
-        flow = rounded(one.get("power_flow"))
-        if flow not in flows:
-            flows.append(flow)
-        one["power_flow"] = flows.index(flow)
     found: dict[str, Any] = rounded({**kept, "modes": {"scenarios": scenarios}})
     return found
+
+
+def _smaller_scenario(one: Mapping[str, Any], flows: list[Any]) -> dict[str, Any]:
+    kept = {key: one[key] for key in _OF_SCENARIO if key in one}
+    flow = rounded(one.get("power_flow"))
+    if flow not in flows:
+        flows.append(flow)
+    modes = [_smaller_mode(mode) for mode in one["modes"]]
+    return {**kept, "modes": modes, "power_flow": flows.index(flow)}
 
 
 def _smaller_mode(mode: Mapping[str, Any]) -> dict[str, Any]:

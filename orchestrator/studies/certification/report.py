@@ -9,7 +9,8 @@ from orchestrator.devices.binding.binding import read_table
 from orchestrator.devices.fmi.archive import read_origin
 from orchestrator.devices.fmi.port import BoundDescription
 from orchestrator.devices.fmi.values import Scalar, as_text
-from orchestrator.output.report.html.elements import Figures, document, listed, table
+from orchestrator.output.report.html.elements import SHADES, Figures, document, listed, table
+from orchestrator.output.report.tables import short
 from orchestrator.studies.certification.case_file import BINDING, FMU, WITH
 from orchestrator.studies.certification.certificate import Certificate, DampingCertificate
 from orchestrator.studies.certification.codes.record import row_chapters
@@ -23,6 +24,7 @@ from orchestrator.studies.certification.report_criteria import (
 from orchestrator.studies.certification.texts import TEXTS
 from orchestrator.studies.certification.verdict import FAILS, INCOMPLETE, PASSES
 
+_LONGEST = 160  # characters of why a row is not accepted, at the top of the page
 _LINE = '<span class="blank"></span>'  # A line to be filled in by hand
 
 Hashes = Mapping[str, str | None]
@@ -221,20 +223,47 @@ def title(c: Certificate) -> str:
 
 
 def _findings(c: Certificate, own: Sequence[str]) -> str:
+    """The verdict in one sentence, a line a row of the code, and what else was asked in short notes."""
     good = c.passed and not c.refused
-    items = [f'<b class="{"good" if good else "bad"}">{escape(c.sentence())}</b>']
+    whole = c.sentence()
+    said = whole if isinstance(c, DampingCertificate) else whole.partition(" Not accepted:")[0]
+    sentences = [f'<b class="{"good" if good else "bad"}">{escape(said)}</b>']
     checked = "not run"
     if c.acceptance is not None:
         checked = "no check failed" if c.acceptance.trusted else "FAILED"
     if c.acceptance is not None and c.refused:
-        items = [
-            f'<b class="bad">ACCEPTANCE TESTS FAILED: {escape(", ".join(c.acceptance.faults))}</b>',
-            *items,
-        ]
-    items.append(f"Acceptance tests of the FMU (gfor fmu check): {checked}")
-    items += own
+        failed = f"ACCEPTANCE TESTS FAILED: {', '.join(c.acceptance.faults)}"
+        sentences.insert(0, f'<b class="bad">{escape(failed)}</b>')
+    notes = [f"Acceptance tests of the FMU (gfor fmu check): {checked}", *own]
+    if said != whole:
+        notes.append(f"<b>{escape(whole)}</b>")  # `gfor verify` looks for the record's own sentence
     warnings = dict.fromkeys(
         text for result in c.results.values() for text in getattr(result, "warnings", ())
     )
     extra = "".join(f'<div class="warning">{escape(text)}</div>' for text in warnings)
-    return f'<div class="findings"><ul>{"".join(f"<li>{item}</li>" for item in items)}</ul></div>{extra}'
+    verdict = "".join(f'<p class="verdict">{text}</p>' for text in sentences)
+    below = "".join(f"<li>{text}</li>" for text in notes)
+    return (
+        f'<div class="findings">{verdict}{_row_lines(c)}<ul class="soft">{below}</ul></div>{extra}'
+    )
+
+
+def _row_lines(c: Certificate) -> str:
+    """A line for each row of a code: its verdict in its colour, and the first criterion that is not met."""
+    if isinstance(c, DampingCertificate):
+        return ""
+    rows = []
+    for verdict in c.verdicts:
+        failed = verdict.failed
+        why = [f"{one.criterion}: {one.text}" for one in failed[:1]] or [verdict.unknown]
+        more = f" (and {', '.join(one.criterion for one in failed[1:])})" if failed[1:] else ""
+        word = {True: "accepted", False: "NOT accepted", None: "not judged"}[verdict.accepted]
+        shade = SHADES[verdict.accepted]
+        rows.append(
+            [
+                escape(verdict.name),
+                f'<b class="{shade}">{word}</b>',
+                escape(f"{short(why[0], _LONGEST)}{more}") or "–",
+            ]
+        )
+    return table("Row by row", ["Row", "Verdict", "Not met"], rows, left=3)

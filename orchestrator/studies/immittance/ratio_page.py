@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.core.arrays import Complex
 from orchestrator.core.errors import InputError
 from orchestrator.output.report.html.elements import document, held_data
 from orchestrator.studies.immittance.judgement import CutJudgement, judge_loop
@@ -67,10 +68,8 @@ def ratio_page(result: CutResult) -> str:
     content = {
         "ratio": own,
         "hertz": _rounded(path.hertz[kept]),
-        "loop": [
-            _rounded(part) for entry in L.reshape(-1, 4).T for part in (entry.real, entry.imag)
-        ],
-        "loci": [_rounded(part) for one in path.loci[kept].T for part in (one.real, one.imag)],
+        "loop": _parts(L.reshape(-1, 4)),
+        "loci": _parts(path.loci[kept]),
         "judged": [one.as_json() for one in judged],
         "device": named(result.loop.device.name),
         "off": _largest_error(result, judged),
@@ -119,6 +118,11 @@ def _largest_error(result: CutResult, judged: list[JudgedRatio]) -> float:
             least = np.linalg.svd(scaled, compute_uv=False)[:, -1].min()
             off.append(abs(float(least) - one.judgement.margins.distance.value))
     return float(f"{max(off):.1e}")
+
+
+def _parts(columns: Complex) -> list[list[float]]:
+    """Real and imaginary parts of each column, one after the other."""
+    return [_rounded(part) for column in columns.T for part in (column.real, column.imag)]
 
 
 def _rounded(values: Any) -> list[float]:

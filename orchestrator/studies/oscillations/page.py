@@ -35,7 +35,7 @@ def source_page(measured: Measurements, found: list[Located]) -> str:
 
 
 def _finding(one: Located) -> str:
-    """What is there and who drives it, in the colour of what is to be done about it, and why."""
+    """Tell what is there and who drives it, in the colour of what is to be done about it, and why."""
     at = f"{one.found.frequency:.3f} Hz:"
     if one.evidence.kind == "not known":
         return f'<b class="{SHADES[None]}">{at} {escape(one.reason)}</b>.'
@@ -49,3 +49,65 @@ def _chapter(
     measured: Measurements, one: Located, found: list[Located], figures: Figures
 ) -> Iterator[str]:
     yield opinions_table("What each method says", one).html()
+    yield _map(measured, one, [x.found.frequency for x in found if x is not one], figures)
+    signals = signals_of(measured)
+    curves = []
+    for k, name in enumerate([n for n in one.found.amplitudes if n.endswith(".p")][:_CURVES]):
+        z, half = envelope(
+            signals.times, signals.values[:, signals.names.index(name)], one.found.frequency
+        )
+        curves.append(
+            ChartCurve(
+                name, colour(k + 1), signals.times[half : len(signals.times) - half], np.abs(z)
+            )
+        )
+    if curves:
+        chart = legend((c.label, c.colour) for c in curves) + line_chart(
+            "timeline", "Time [s]", "Amplitude", curves
+        )
+        yield figures.add(chart, "Amplitude over the time, of the powers that show it best.")[0]
+
+
+def _map(measured: Measurements, one: Located, others: list[float], figures: Figures) -> str:
+    """Buses by the dissipating energy that is fed there, and branches by what flows along them."""
+    energy = dict(
+        zip(
+            [p.name for p in measured.places],
+            works(measured.places, measured.times, one.found, others)[0].values.tolist(),
+            strict=True,
+        )
+    )
+    scale = max(map(abs, energy.values()), default=0.0) or 1.0
+    fed: dict[str, float] = {}
+    flows: dict[tuple[str, str], float] = {}
+    for place in measured.places:
+        if place.beyond:
+            fed.setdefault(place.beyond, 0.0)
+            out = -energy[place.name] / scale
+            if abs(out) > _LEAST_FLOW:
+                flows[(place.bus, place.beyond) if out > 0 else (place.beyond, place.bus)] = min(
+                    abs(out), 1.0
+                )
+        fed[place.bus] = fed.get(place.bus, 0.0) + (
+            0.0 if place.beyond else energy[place.name] / scale
+        )
+    branches = [(place.bus, place.beyond) for place in measured.places if place.beyond]
+    texts = {
+        bus: f"{bus}: {'feeds' if part > 0 else 'takes'} {abs(part):.0%}"
+        for bus, part in fed.items()
+    }
+    text = "Dissipating energy, as parts of the largest flow: the redder a bus, the more it feeds; arrows along flows."
+    return figures.add(network_map("map of energy flows", branches, fed, texts, flows), text)[0]
+
+
+def _spectrum(measured: Measurements, found: list[Located], figures: Figures) -> str:
+    grid, power = spectra(signals_of(measured).values, measured.interval)
+    shown = (grid > 0.05) & (grid < min(4.0, 0.4 / measured.interval))
+    mean = power[shown].mean(axis=1)
+    level = 10 * np.log10(np.maximum(mean / mean.max(), 1e-12))
+    curves = [ChartCurve("all signals", colour(1), grid[shown], level)]
+    chart = line_chart("spectrum", "Frequency [Hz]", "Power [dB]", curves)
+    lines = ", ".join(f"{x.found.frequency:.4f} Hz" for x in found) or "none"
+    return figures.add(
+        chart, f"Mean power of all signals, each as a part of its own. Lines found: {lines}."
+    )[0]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +12,7 @@ import numpy as np
 from rich.markup import escape as escape_markup
 
 from orchestrator.cases.settings.layers import joined_values
-from orchestrator.core.errors import Problem, few
+from orchestrator.core.errors import Problem, counted, few
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder, write_text
 from orchestrator.core.truth import NoTruth
@@ -22,7 +24,7 @@ from orchestrator.output.report.html.charts import (
     legend,
     line_chart,
 )
-from orchestrator.output.report.html.elements import Figures, colour, document, paragraphs
+from orchestrator.output.report.html.elements import SHADES, Figures, colour, document
 from orchestrator.output.report.notebook import page
 from orchestrator.output.report.table import Column, ColumnTable, Marked, damping
 from orchestrator.output.report.tables import eigenvalue_text, kinds_of
@@ -300,12 +302,14 @@ def modes_table(
     """Each mode where it is damped least, and the converter whose damping controller moves it most there.
 
     ``whole``: with eigenvalue and participation, for which a terminal is too narrow."""
-    more: list[Column[ScreenedMode]] = [
-        Column("λ [rad/s]", lambda mode: mode.worst.value, eigenvalue_text),
-        Column(
-            "Participation",
+    takes_part = [
+        Column[ScreenedMode](
+            "Who takes part",
             lambda mode: ", ".join(f"{name} {x:.2f}" for name, x in mode.worst.participation(4)),
-        ),
+        )
+    ][: int(whole)]
+    value = [Column[ScreenedMode]("λ [rad/s]", lambda mode: mode.worst.value, eigenvalue_text)][
+        : int(whole)
     ]
 
     def best(mode: ScreenedMode) -> tuple[str, float | None]:
@@ -317,15 +321,16 @@ def modes_table(
             Column("Mode", lambda mode: mode.name, name="mode"),
             Column("Point", lambda mode: mode.worst.item.point.name, name="point"),
             Column("Outage", lambda mode: mode.worst.item.outage.name, name="outage"),
+            *takes_part,
             Column("", lambda mode: mode.worst.frequency, name="frequency_hz"),
             Column("Damping [%]", lambda mode: mode.worst.damping, damping, "damping_percent"),
             Column("Items", lambda mode: len(mode.at), name="items"),
-            *(more if whole else ()),
+            *value,
             Column("Converter", lambda mode: best(mode)[0]),
             Column("by gain [rad/s]", lambda mode: best(mode)[1], ".3g"),
         ),
         summary.modes,
-        3,
+        3 + len(takes_part),
         most,
         MODES,
     )
@@ -446,9 +451,18 @@ def _page(summary: Summary) -> str:
         )
         content.append(("Not computed", shown.html()))
     title = f"{plan.case.table.title or plan.case.name}: screening"
-    kind = f"{plan.prepared.title}, {len(plan.points)} operating points, {len(plan.outages) - 1} outages"
-    told = [verdict_sentence(summary), limits_sentence(summary), what_was_counted(summary)]
-    findings = paragraphs(summary.stable, [text for text in told if text])
+    points, outages = (
+        counted(len(plan.points), "operating point"),
+        counted(len(plan.outages) - 1, "outage"),
+    )
+    kind = f"{plan.prepared.title}, {points}, {outages}"
+    shade, sure = SHADES[summary.stable], what_was_counted(summary)
+    verdict = re.sub("`([^`]+)`", r"<code>\1</code>", escape(verdict_sentence(summary)))
+    told = "".join(f"<p>{escape(text)}</p>" for text in [limits_sentence(summary)] if text)
+    findings = (
+        f'<div class="findings"><p class="verdict"><b class="{shade}">{verdict}</b></p>{told}'
+        f'<p class="soft">{escape(sure)}</p></div>'
+    )
     return document(title, kind, findings, content, names=plan.prepared.names)
 
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestrator.core.errors import counted
 from orchestrator.linear.spectra.critical_modes import DENSE
 from orchestrator.linear.spectra.shifted_equations import GROWING
 from orchestrator.linear.spectra.stability import zeros_in_words
@@ -156,15 +155,15 @@ def verdict_of(summary: Summary) -> VerdictSentence:
         growing = (one.item for one in summary.least_damped() if one.item.record.stable is False)
         worst = next(growing, summary.unstable[0])
         lost = "".join(f"; {text}" for text in (not_judged(summary), summary.beyond) if text)
-        text = f"{counted(len(summary.unstable), 'item')} of {total}; worst: {where(worst)}{_least(worst)}{lost}"
+        text = f"at {len(summary.unstable)} of {total} points and outages; worst: {where(worst)}{_least(worst)}{lost}"
         return VerdictSentence(False, "UNSTABLE", text)
     computed = summary.counts[Status.COMPUTED]
     least = summary.least_damped()[:1]
     tail = f"; least damped: {where(least[0].item)}{_least(least[0].item)}" if least else ""
     if summary.free:
         first = summary.free[0]
-        items, zeros = counted(len(summary.free), "item"), zeros_in_words(first.record.zeros)
-        tail += f"; at {items}, first at {where(first)}, {zeros}"
+        zeros = zeros_in_words(first.record.zeros)
+        tail += f"; at {len(summary.free)} of them, first at {where(first)}, {zeros}"
     tail += f"; {summary.beyond}" if summary.beyond else ""
     if summary.stable:
         text = f"nothing grows at any of {total} points and outages{_but_slowly(summary)}{tail}"

@@ -13,7 +13,7 @@ from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder, write_text
 from orchestrator.core.truth import all_true
 from orchestrator.linear.spectra.modes import damping_percent
-from orchestrator.output.report.html.elements import Figures, damping, document, table
+from orchestrator.output.report.html.elements import SHADES, Figures, damping, document, table
 from orchestrator.output.report.html.network_map import network_map
 from orchestrator.output.report.notebook import page
 from orchestrator.output.report.table import ShownTable
@@ -439,8 +439,13 @@ def _page(result: SiteResult) -> str:
         f"{result.case.table.title or result.case.name}: where to put {device_title(result)}",
     )
     shade = "good" if result.agrees and result.confirmations else "soft"
-    lines = "".join(f"<li>{escape(text)}</li>" for text in (*sureness(result), *remarks(result)))
-    findings = f'<div class="findings"><p class="{shade}">{escape(answer(result))}</p><ul>{lines}</ul></div>'
+    told = sureness(result)
+    beside = told[: len(told) - max(1, len(result.confirmations))] if result.confirmations else told
+    lines = "".join(f"<li>{escape(text)}</li>" for text in (*beside, *remarks(result)))
+    findings = (
+        f'<div class="findings"><p class="verdict"><b class="{shade}">{escape(answer(result))}</b></p>'
+        f'{_confirmed_table(result)}<ul class="soft">{lines}</ul></div>'
+    )
     content = [("Map", "".join(_map(result, seen, figures) for seen in result.intact.modes[:3]))]
     all_buses = _table_of(result, unit(result, "100"), result.ranking)
     content.append(("All buses", all_buses.html()))
@@ -468,6 +473,32 @@ def _page(result: SiteResult) -> str:
         )
     kind, names = f"{result.prepared.title}; code {code_hash()[:12]}", result.prepared.names
     return document(title, kind, findings, content, names=names)
+
+
+def _confirmed_table(result: SiteResult) -> str:
+    """The places that coupled FMUs tried, a line each: the verdict, and the damping without, with device and POD."""
+    if not result.confirmations:
+        return ""
+    seen = result.intact.modes[0]
+    before = f"{seen.mode.damping_percent:.2f}"
+    rows = []
+    for one in result.confirmations:
+        verdict, good = _verdict_on(result, one)
+        cells = [escape(one.bus), f'<b class="{SHADES[good]}">{escape(verdict)}</b>', before]
+        others = _confirmed_cells(result, one.bus)
+        off = "–" if one.failure else f"{100 * one.error:.2g}"
+        rows.append([*cells, *others, off])
+    headings = ["Bus", "By coupled FMUs", f"{seen.label} without [%]"]
+    headings += [*_confirmed_headings(result), "prediction off by [%]"]
+    return table(f"With {_rated(result)}", headings, rows, left=2)
+
+
+def _verdict_on(result: SiteResult, one: Confirmation) -> tuple[str, bool]:
+    if one.failure:
+        return f"NOT CONFIRMED: {one.failure}", False
+    if one in result.breaking:
+        return "UNSTABLE with it", False
+    return ("confirmed", True) if one.agrees else ("NOT CONFIRMED", False)
 
 
 def _map(result: SiteResult, seen: SeenMode, figures: Figures) -> str:

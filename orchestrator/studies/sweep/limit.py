@@ -147,7 +147,7 @@ class ParameterLimit:
         up_to = f"{holding} {direction} {self.key} = {self._value(self.holds_at)}{self._dip()}"
         if self.kind is Ending.FAILS:
             return [f"{up_to}, {what} at {at}{self._again()}{mode}"]
-        no_limit = "which is no limit of stability"
+        no_limit = "where stability is not judged (it is no limit of stability)"
         return [
             f"{what} from {self.key} = {at} on, {no_limit}{why}",
             f"{up_to}{self._again()}",

@@ -169,6 +169,8 @@ def test_the_first_screen_has_the_answer_its_shape_five_sliders_and_a_response(b
     view.locator("#else-said", has_text="Base (only SG): UNSTABLE").wait_for()
     view.locator("#questions button", has_text="twice as long").click()
     view.locator("#else-said", has_text="Now: stable").wait_for()
+    view.locator("#questions button", has_text="gives 10 %").click()
+    view.locator("#else-said", has_text="10.00 % at K 1225").wait_for()
     assert view.evaluate("state.values") == {}  # a question changes nothing
     gain.locator("input[type=text]").fill("100")
     gain.locator("input[type=text]").press("Enter")

@@ -527,7 +527,7 @@ def test_an_unstable_point_fails_where_asked(gfor, tmp_path):
     options = ("--scenario", "gfor", "--points", path, "--workers", "1", "--out", tmp_path / "out")
     code, out, _ = gfor("screen", "two_area", *options, "--fail-unstable")
     assert code == 1
-    assert out.startswith("UNSTABLE: 1 item of 2; worst: out, intact")
+    assert out.startswith("UNSTABLE: at 1 of 2 points and outages; worst: out, intact")
     assert "Least damping [%]" in out
     assert gfor("screen", "two_area", *options)[0] == 0
     path.write_text("name,gfor.in_service\nin,1\n")

@@ -99,7 +99,9 @@ def test_of_two_points_the_one_that_was_not_judged_is_named(plan):
 
 def test_what_was_not_judged_is_told_of_an_unstable_network_too(plan):
     found = summary(plan, {("night", "sg1"): LOST, ("noon", "sg2"): mode(0.1)})
-    assert verdict_sentence(found).startswith("UNSTABLE: 1 item of 16; worst: noon, sg2: ")
+    assert verdict_sentence(found).startswith(
+        "UNSTABLE: at 1 of 16 points and outages; worst: noon, sg2: "
+    )
     assert "1 not judged" in verdict_sentence(found)
 
 

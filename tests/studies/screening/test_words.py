@@ -84,7 +84,7 @@ def screened(tmp_path_factory):
 def test_the_verdict_says_how_fast_the_worst_point_grows(screened):
     sentence = verdict_sentence(Summary(screened))
     assert sentence.startswith(
-        "UNSTABLE: 1 item of 2; worst: out, intact: 2 eigenvalues grow outside of the range, by "
+        "UNSTABLE: at 1 of 2 points and outages; worst: out, intact: 2 eigenvalues grow outside of the range, by "
     )
     assert sentence.endswith(" 1/s at 0.572 Hz")
 

@@ -160,6 +160,11 @@ def test_the_json_has_a_shift_for_each_bus_and_mode(gfor, tmp_path):
     assert "damping_points_per_100_MW_per_Hz" in found["buses"][0]["p"]["electromechanical"]
     assert found["confirmed"][0]["agrees"] is True
     assert {"site.html", "buses.csv"} < {path.name for path in tmp_path.iterdir()}
+    page = (tmp_path / "site.html").read_text(encoding="utf-8")
+    top = page[page.index('<div class="findings">') : page.index("<section")]
+    with_pod = f"{found['confirmed'][0]['damping_percent']:.2f}"
+    assert '<b class="good">confirmed</b>' in top
+    assert f"<td>{with_pod}</td>" in top
 
 
 @pytest.mark.parametrize(

@@ -125,14 +125,15 @@ async function searchWith(name, percent) {
   box.querySelector("details")?.setAttribute("open", "");
   box.scrollIntoView({ block: "nearest" });
   sayElse(`${name} is tried ${percent === null ? "until the system is unstable" : `until the least damped mode has ${percent} %`} …`);
-  await one.search(percent);
-  sayElse(`${name}: ${one.said.innerText.replaceAll("\nalso ", "; also ").replaceAll(" set", "").split("\n")[0]}`);
+  const show = await one.search(percent, false), button = make("button", {}, "show it");
+  button.addEventListener("click", () => show());
+  sayElse(`${name}: ${one.said.innerText.replaceAll("\nalso ", "; also ").replaceAll(" set", "").split("\n")[0]} `, show ? button : "");
 }
 async function withoutConverter(other) {
   sayElse(`${seen.titles[other]}: being computed …`);
   const error = make("span"), found = await ask("comparison", { ask: "modes", ...theCase(), scenario: other, values: {}, events: null, range: state.range }, error);
   if (found === undefined) return;
-  sayElse(found ? `${seen.titles[other]}: ${swingOf(found)}. ${seen.answer.title}: ${swingOf(seen.answer)}.` : `${seen.titles[other]}: ${reasonOf(error.textContent)}`);
+  sayElse(found ? `${seen.titles[other]}: ${swingOf(found)}. ${titleNow()}: ${swingOf(seen.answer)}.` : `${seen.titles[other]}: ${reasonOf(error.textContent)}`);
 }
 function whatAModeIs() {
   const m = seen.modes[chosenIndex()] ?? leastOf(seen.modes), z = m ? m.damping_percent / 100 : 0, left = Math.exp(-2 * Math.PI * z / Math.sqrt(Math.max(1e-9, 1 - z * z)));

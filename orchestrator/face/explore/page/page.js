@@ -39,12 +39,17 @@ async function compute(place = null) {
   return true;
 }
 const leastOf = modes => [...modes].sort((a, b) => a.damping_percent - b.damping_percent)[0];
+// The scenario, and what was changed in it.
+function titleNow() {
+  const changed = Object.entries(state.values).map(([name, value]) => `${name} = ${number(value)}`);
+  return `${seen.answer.title}${changed.length ? `, with ${changed.slice(0, 3).join(", ")}${changed.length > 3 ? ` and ${changed.length - 3} more` : ""}` : ""}`;
+}
 function paintVerdict() {
   const one = seen.answer.modes.scenarios[0];
   $("verdict").className = one.stable === true ? "good" : one.stable === false ? "bad" : "";
   const least = leastOf(seen.modes), [low, high] = state.range;
   const swing = least ? `least damped from ${number(low)} to ${number(high)} Hz: ${fixed(least.frequency_hz, 3)} Hz, ${fixed(least.damping_percent, 2)} % (${Object.keys(least.components).slice(0, 2).join(", ")})` : `no oscillation from ${number(low)} to ${number(high)} Hz`;
-  $("verdict").textContent = `${seen.answer.title}: ${one.stable === true ? "stable" : one.stable === false ? "UNSTABLE" : "not known"} (small-signal); ${swing}`;
+  $("verdict").textContent = `${titleNow()}: ${one.stable === true ? "stable" : one.stable === false ? "UNSTABLE" : "not known"} (small-signal); ${swing}`;
   $("outside").querySelector("span").textContent = [`${seen.answer.verdict}.`, seen.answer.outside && `${seen.answer.outside}.`, ...(seen.answer.warnings ?? one.warnings).map(text => `Warning: ${text}`)].filter(Boolean).join(" ");
   $("wider").hidden = Boolean(SAVED) || !seen.answer.outside || state.range[1] >= 1000;
 }

@@ -70,7 +70,7 @@ function paintChosen() {
   const swing = seen.answer.swings?.[chosenIndex()] ?? [[], []];
   const some = units => `${units.slice(0, 6).join(", ")}${units.length > 6 ? ` and ${units.length - 6} more` : ""}`;
   const between = some(Object.entries(swing[2] ?? {}).map(([name, angle]) => `${name} at ${angle > 0 ? "+" : ""}${fixed(angle, 0)}°`));
-  const who = [swing[0], swing[1]].filter(side => side.length).map(some).join(" against ") + (between ? `; ${between}` : "");
+  const who = [swing[0], swing[1]].filter(side => side.length).map(some).join(" against ") + (between ? `; ${between}, neither with nor against` : "");
   const moving = make("input", { type: "checkbox", id: "moving" });
   const shape = draw("svg", { class: "shape", viewBox: "-150 -105 300 210", role: "img", "aria-label": `Mode shape: ${m.shape.map(s => `${s.state} ${number(s.magnitude, 2)} at ${fixed(s.angle_deg, 0)}°`).join("; ")}` });
   const largest = Math.max(...m.shape.map(s => s.magnitude), 1e-12);

@@ -126,7 +126,7 @@ function finderOf(key, spec) {
 function finder({ now, bounds, valuesAt, apply, words }) {
   const wanted = make("input", { value: 5, size: 3, inputmode: "decimal", "aria-label": `damping in % that ${words} is looked for` }), said = make("span", { class: "soft block", role: "status" }), begin = make("button", {}, "find"), until = make("button", { title: "the whole spectrum, aperiodic growth too" }, "until unstable");
   const say = text => { said.textContent = text; };
-  const search = async percent => {  // null: until unstable
+  const search = async (percent, sets = true) => {  // null: until unstable
     if (percent !== null && Number.isFinite(percent)) wanted.value = percent;
     if (!(percent === null || (percent > -100 && percent < 100))) { say("give a damping in percent"); return; }
     const here = now(), [least, most] = bounds(), error = make("span"), cancels = seen.cancels, tried = [];
@@ -191,12 +191,13 @@ function finder({ now, bounds, valuesAt, apply, words }) {
     crossings.sort((a, b) => far(a) - far(b));
     const text = ({ good, bad }) => (percent === null ? `stable ${bad.x > good.x ? "up" : "down"} to ${words} ${number(good.x, 6)}, UNSTABLE at ${number(bad.x, 6)}: ${bad.verdict.replace(/^UNSTABLE: /, "")}`
       : `${fixed(good.damping, 2)} % at ${words} ${number(good.x, 6)}; ${bad.x > good.x ? "above" : "below"} it is less than ${number(percent)} %${bad.f < -percent ? " (unstable)" : ""}`);
-    if (percent !== null) await apply(crossings[0].good.x);
+    if (percent !== null && sets) await apply(crossings[0].good.x);
     said.replaceChildren(...crossings.flatMap((one, k) => {
       const button = make("button", {}, "set");
       button.addEventListener("click", () => apply(one.good.x));
       return [k ? "also " : "", text(one), " ", button, make("br")];
     }), tail.slice(2));
+    return () => apply(crossings[0].good.x);
   };
   begin.addEventListener("click", () => search(Number(wanted.value.trim().replace(",", ".") || NaN)));
   until.addEventListener("click", () => search(null));
