@@ -155,11 +155,11 @@ def _share_of(prepared: PreparedScenario) -> Any:
 
 def _own_values(axes: Sequence[Axis], known: Mapping[str, Any]) -> dict[str, float]:
     """The case's value of each axis that has one: of several that are set together, the one that all have."""
-    found = {}
+    found: dict[str, float] = {}
     for axis in axes:
-        before = {known.get(key) for key in axis.sets(axis.values[0])}
-        if len(before) == 1 and None not in before:
-            found[axis.key] = float(*before)
+        before = [known.get(key) for key in axis.sets(axis.values[0])]
+        if before[0] is not None and before.count(before[0]) == len(before):
+            found[axis.key] = float(before[0])
     return found
 
 

@@ -147,7 +147,7 @@ function paintQuestions() {
   const other = Object.keys(seen.titles).find(name => seen.systems?.[name] !== seen.systems?.[state.scenario]), off = gain?.switches[0], questions = [];
   const add = (text, act) => { const button = make("button", {}, text); button.addEventListener("click", act); questions.push(button, " "); };
   if (!SAVED && line) add(`What if line ${line.name} is out?`, () => withValues({ [line.open]: false }, `Without line ${line.name}`));
-  else if (!SAVED && long) add(`What if line ${long.name} were twice as long?`, () => withValues(Object.fromEntries([long.length, long.resistance, long.charging].filter(n => n && parameterOf(n) && original(n)).map(n => [n, 2 * original(n)])), `Line ${long.name}, twice as long`));
+  else if (!SAVED && long) add(`What if line ${long.name} were twice as long?`, () => withValues(Object.fromEntries([long.length, long.resistance, long.charging].filter(n => n && parameterOf(n) && original(n)).map(n => [n, 2 * (state.values[n] ?? original(n))])), `Line ${long.name}, twice as long`));
   if (!SAVED && first) add(`Up to which ${first} is it stable?`, () => searchWith(first, null));
   if (!SAVED && (gain || first)) add(`Which ${gain ? `gain ${gain.parameter}` : first} gives ${WANTED_DAMPING} %?`, () => searchWith(gain?.parameter ?? first, WANTED_DAMPING));
   if (!SAVED && other) add("What does the converter do?", () => withoutConverter(other));
