@@ -4,6 +4,7 @@ import itertools
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -157,8 +158,9 @@ def _own_values(axes: Sequence[Axis], known: Mapping[str, Any]) -> dict[str, flo
     """The case's value of each axis that has one: of several that are set together, the one that all have."""
     found: dict[str, float] = {}
     for axis in axes:
-        before = [known.get(key) for key in axis.sets(axis.values[0])]
-        if before[0] is not None and before.count(before[0]) == len(before):
+        keys = axis.sets(axis.values[0])
+        before = [x for name, x in known.items() if any(fnmatchcase(name, key) for key in keys)]
+        if before and before[0] is not None and before.count(before[0]) == len(before):
             found[axis.key] = float(before[0])
     return found
 

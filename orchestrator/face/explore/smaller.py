@@ -3,8 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-_DIGITS = 7  # significant ones of a number; the page shows at most six
-_STATES = 8  # of a mode's participation, as many as the page has bars
+_DIGITS = 6  # significant ones of a number, as many as the page shows
+_OF_SHARES = 3  # significant digits of participations and shapes
+_STATES = 7  # of a mode's participation; the page has bars for eight at most
 _COMPONENTS = 6  # of a mode's participation
 _SEEN = 0.02  # an arrow shorter than this part of the longest is not drawn
 _OF_SCENARIO = ("name", "stable", "warnings", "power_flow", "modes")
@@ -34,22 +35,22 @@ def _smaller_mode(mode: Mapping[str, Any]) -> dict[str, Any]:
     shape = mode.get("shape", [])
     least = _SEEN * max((one["magnitude"] for one in shape), default=0.0)
     components = [*mode.get("components", {}).items()]
-    return {
-        **mode,
+    drawn = {
         "participation": mode.get("participation", [])[:_STATES],
         "components": dict(components[:_COMPONENTS]),
         "shape": [one for one in shape if one["magnitude"] > least],
     }
+    return {**mode, **rounded(drawn, _OF_SHARES)}
 
 
-def rounded(content: Any) -> Any:
+def rounded(content: Any, digits: int = _DIGITS) -> Any:
     """The same content, each number with as many digits as a page needs."""
     if isinstance(content, float):
-        return float(f"{content:.{_DIGITS}g}")
+        return float(f"{content:.{digits}g}")
     if isinstance(content, Mapping):
-        return {key: rounded(one) for key, one in content.items()}
+        return {key: rounded(one, digits) for key, one in content.items()}
     if isinstance(content, list | tuple):
-        return [rounded(one) for one in content]
+        return [rounded(one, digits) for one in content]
     return content
 
 

@@ -25,11 +25,18 @@ async function dragSaved(name, value) {
   const begin = performance.now(), others = SAVED.movers ? [] : Object.keys(SAVED.grid).filter(one => one !== name);
   const wanted = { [name]: value, ...Object.fromEntries(others.map(one => [one, state.values[one] ?? ownOf(one)])) };
   Object.assign(seen, { moved: name, dragged: value });
-  state.values[name] = value;
-  await compute();
-  if (seen.dragged !== value) return;  // the slider went on
+  const near = JSON.stringify([name, heldNear(name, value), others.map(one => wanted[one])]);
+  if (near !== seen.near) {  // else what is drawn is that state already
+    state.values[name] = value;
+    await compute();
+    seen.near = near;
+    if (seen.dragged !== value) return;  // the slider went on
+  }
   const cell = SAVED.cells.find(one => Object.entries(one.at).every(([key, [low, high]]) => key in wanted && low <= wanted[key] && wanted[key] <= high));
-  if (!cell || value === heldNear(name, value)) return;
+  if (!cell || value === heldNear(name, value)) {
+    if (seen.estimate) { seen.estimate = null; paintVerdict(); paintMap(); paintTable(); }
+    return;
+  }
   const between = betweenOf(cell, wanted), corner = cell.corners.findIndex(place => SAVED.answers[place].answer === seen.answer);
   seen.estimate = { name, value, modes: seen.modes.map((_, k) => between[cell.modes.findIndex(one => one[corner] === k)] ?? null) };
   paintMap(); paintTable();
@@ -52,7 +59,7 @@ function betweenOf(cell, wanted) {
 async function setSaved(name, value) {
   const near = typeof value === "number" && name in SAVED.grid ? heldNear(name, value) : null;
   if (near !== null) { seen.moved = name; if (near === ownOf(name)) delete state.values[name]; else state.values[name] = near; }
-  seen.estimate = null;
+  Object.assign(seen, { estimate: null, near: null });
   await compute();
   keepState();
   paintControls();
