@@ -84,26 +84,32 @@ def test_a_controller_whose_output_is_not_shown_is_judged_by_the_power(tmp_path)
     assert found.faults == ["POD of some points only"]
 
 
+TIRES = (
+    "(1 - 0.9 * fmin(1, 2 * m[WORKED]))",
+    "POD changes with time",
+    "otherwise 3 s after strong swings",
+)
+"""It tires until its output is 0.6 of its limit: afterwards about 40 % of its answer are missing."""
+
+
 @pytest.mark.parametrize(
-    ("times", "fault", "said"),
+    ("seed", "times", "fault", "said"),
     [
-        ("(m[AGE] > 4)", "POD changes with time", "and answers one after 10 s at rest"),
+        (1, "(m[AGE] > 4)", "POD changes with time", "and answers one after 10 s at rest"),
         (
+            1,
             "(m[P_REF] > 0.5)",
             "POD of some points only",
             "at P_0 = 0.4, v_0 = 1, and answers one at",
         ),
-        (
-            "(1 - 0.9 * fmin(1, 2 * m[WORKED]))",
-            "POD changes with time",
-            "otherwise 3 s after strong swings",
-        ),
+        (1, *TIRES),  # swings at 0.79 Hz
+        (3, *TIRES),  # at 1.24 Hz
     ],
 )
-def test_less_than_its_answer_is_told_by_its_cause(tmp_path, times, fault, said):
+def test_less_than_its_answer_is_told_by_its_cause(tmp_path, seed, times, fault, said):
     """It wakes late, acts at high power alone, or tires while its limit is tried."""
     file = build(converter("asleep", pod=True, FAULT_POD_TIMES=times), tmp_path)
-    found = check_fmu(file, None, LIMITS, ("pod",), run_for=0.3)
+    found = check_fmu(file, None, LIMITS, ("pod",), run_for=0.3, seed=seed)
     assert found.faults == [fault], found.failures
     assert said in found.failures[0].evidence
 

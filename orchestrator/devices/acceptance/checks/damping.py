@@ -46,6 +46,7 @@ _LEAST = 0.5  # how much smaller an answer may be at another point
 _MOST = 2.0  # how much larger
 _SAME_TIME = 0.05  # part of the answer by which it may differ at another time or step
 _DAMAGED = 0.4  # part of the answer by which it may differ soon after events
+_TIRED = 0.2  # the same if its answer fell short of what it should be while it worked: the cause is then its work
 _PROPORTION = 0.15  # part of the answer by which that to a larger swing below the limit may differ
 _LESS = 0.9  # how much smaller the answer to a larger swing may be
 _OF_POWER = 0.85  # least power in parts of the declared limit, where its output is not shown
@@ -360,18 +361,20 @@ class _Trial:
         where = "after it was switched off and on again twice"
         return self._changed(parts, "POD changed by its switch", where)
 
-    def _after_work(self) -> _Fault | None:
+    def _after_work(self, least: float = _DAMAGED) -> _Fault | None:
         strong = min(_BEYOND * self._size, _LARGEST)
         parts = self._bench.apart_after_work(self._size, strong)
-        return self._changed(parts, "POD changes with time", "3 s after strong swings")
+        return self._changed(parts, "POD changes with time", "3 s after strong swings", least)
 
     def _unless_tired(self, fault: _Fault | None) -> _Fault | None:
         """Return what its work changes in it, if that is what gives it less in a strong swing; else the fault."""
-        return fault and (self._after_work() or fault)
+        return fault and (self._after_work(_TIRED) or fault)
 
-    def _changed(self, parts: list[float], fault: str, where: str) -> _Fault | None:
+    def _changed(
+        self, parts: list[float], fault: str, where: str, least: float = _DAMAGED
+    ) -> _Fault | None:
         worst = int(np.argmax(parts))
-        if parts[worst] < _DAMAGED:
+        if parts[worst] < least:
             return None
         says = f"{self._usual[worst].title} answers by {100 * parts[worst]:.3g} % otherwise {where}"
         return _Fault(fault, says)
