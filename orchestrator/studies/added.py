@@ -1,6 +1,7 @@
 """The studies that are installed: each is a command and a method of `Case`, ours and those of other distributions."""
 
 import ast
+import re
 from collections.abc import Collection
 from importlib.metadata import EntryPoint
 from importlib.util import find_spec
@@ -34,16 +35,22 @@ def unlisted(commands: Collection[str]) -> dict[str, str]:
 
 
 def _words_of(name: str) -> str:
-    """First sentence of the study's module, which need not be imported; its distribution where that has none."""
+    """First sentence of the study's module, which is not imported, and its distribution if that is not ours."""
     entry = _first_entry(name)
     try:
         spec = find_spec(entry.module)
         text = Path(spec.origin).read_text(encoding="utf-8") if spec and spec.origin else ""
-        first = (ast.get_docstring(ast.parse(text)) or "").partition("\n")[0].rstrip(".")
+        first = _first_sentence(ast.get_docstring(ast.parse(text)) or "")
     except (ImportError, OSError, SyntaxError, ValueError):
         first = ""
     words = first[:1].lower() + first[1:] if first else "a study"
     return words if is_own(entry) else f"{words} (of {source_of(entry)})"
+
+
+def _first_sentence(text: str) -> str:
+    """The first sentence of a docstring, on whichever of its lines that ends, without its full stop."""
+    paragraph = " ".join(text.partition("\n\n")[0].split())
+    return re.split(r"(?<=[.!?])\s", paragraph, maxsplit=1)[0].rstrip(".")
 
 
 def _first_entry(name: str) -> EntryPoint:

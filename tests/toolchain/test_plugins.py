@@ -133,6 +133,15 @@ def test_a_broken_study_is_one_error_and_help_lives(installed, files, value, say
     assert "Traceback" not in done.stderr
 
 
+def test_studies_of_others_stand_behind_our_commands_with_their_first_sentence(installed):
+    text = '"""The first sentence\nof a study. The second one."""\nSTUDY = 3'
+    installed.install("vendor", {"own.py": text}, {"gfor_cosim.studies": {"count": "own:STUDY"}})
+    listed = " ".join(installed(*GFOR, "--help").stdout.split())
+    assert " count the first sentence of a study (of vendor 1.0)" in listed
+    assert listed.index(" run steady state") < listed.index(" count the first")
+    assert "second one" not in listed
+
+
 def test_a_study_that_is_called_as_a_command_of_ours_is_told(installed):
     installed.install(
         "vendor", {"own.py": "STUDY = 3"}, {"gfor_cosim.studies": {"run": "own:STUDY"}}

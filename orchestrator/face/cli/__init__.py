@@ -129,17 +129,18 @@ def _spelt_today(words: Sequence[str]) -> list[str]:
 
 
 def commands() -> dict[str, str]:
-    """Return our commands and the studies of other distributions, with what each is for."""
+    """Return our commands, and behind them the studies of other distributions, with what each is for."""
     from orchestrator.studies.added import unlisted  # noqa: PLC0415 - imports what all studies need
 
     added = unlisted(COMMANDS)
-    for name in added.keys() & {name.partition(" ")[0] for name in COMMANDS}:
+    taken = added.keys() & {name.partition(" ")[0] for name in COMMANDS}
+    for name in taken:
         print(
             f"note: the study {name!r} is not used, as gfor {name} is a command of gfor-cosim: {added[name]}; "
             f"give it another name",
             file=sys.stderr,
         )
-    return added | COMMANDS
+    return COMMANDS | {name: words for name, words in added.items() if name not in taken}
 
 
 def _command_in(words: Sequence[str], listed: Collection[str] = COMMANDS) -> str | None:

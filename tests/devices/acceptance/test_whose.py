@@ -10,7 +10,7 @@ import pytest
 
 from fmus.toolchain.compiler import host_platform
 from orchestrator.core.errors import ComponentError, HostileFmuError
-from orchestrator.devices.acceptance.checks.base import REMEDIES
+from orchestrator.devices.acceptance.checks.base import REMEDIES, failed
 from orchestrator.devices.acceptance.controller_dll.questions import REMEDIES as OF_DLLS
 from orchestrator.devices.acceptance.runner import _REFUSED, check_fmu
 from orchestrator.devices.fmi.archive import extract
@@ -332,3 +332,8 @@ def test_every_fault_that_is_named_has_a_remedy():
     }
     assert len(named) > 40
     assert named - set(REMEDIES) - set(OF_DLLS) == set()
+
+
+def test_a_fault_without_a_remedy_is_named_with_the_way_to_give_it_one():
+    with pytest.raises(ValueError, match=r"'drifts' has no remedy; give it one with add_remedies"):
+        failed("rest", "drifts", "it moves by 0.1 pu")

@@ -128,7 +128,11 @@ def failed(name: str, fault: str, evidence: str, **figures: Any) -> CheckResult:
     """A check that found a fault of the FMU.
 
     ``fault``: A key of `REMEDIES`, which has the remedy for it.
-    ``figures``: what was measured, for the report: plain values by name."""
+    ``figures``: what was measured, for the report: plain values by name.
+
+    Raises a `ValueError` if the fault has no remedy."""
+    if fault not in REMEDIES:
+        raise ValueError(f"the fault {fault!r} has no remedy; give it one with add_remedies")
     return CheckResult(
         name,
         Verdict.FAIL,

@@ -1,12 +1,14 @@
 """Programme of the test bench in one row of a code: its operating point, and what changes when."""
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from math import hypot, radians, sqrt
 
 import numpy as np
 
 from orchestrator.cases.form.schema import Value
 from orchestrator.core.arrays import Numbers
+from orchestrator.core.errors import InputError
 
 # rating that the plant under test is given [MVA], so that its per unit are the bench's
 RATING_MVA = 100.0
@@ -128,7 +130,19 @@ def weakening(
 def voltage(
     scr: float, power: float, factors: tuple[tuple[float, float], ...], stop: float
 ) -> BenchProgramme:
-    """The source's voltage takes one factor after the other, each from a time after the first event on [s]."""
+    """The source's voltage takes one factor after the other.
+
+    ``factors``: pairs of a time and a factor, in this order: the time after the first event from which it holds [s],
+    and the voltage in parts of that at the start. The first time is 0, and times rise.
+    ``stop``: when the run ends; the first event is at 1 s [s].
+
+    Raises an `InputError` for other times, as a pair has that is written the other way round."""
+    times = [after for after, _ in factors]
+    if times[:1] != [0.0] or any(later <= sooner for sooner, later in pairwise(times)):
+        raise InputError(
+            f"voltage: the factors' times are {', '.join(f'{t:g}' for t in times) or 'missing'} s; "
+            "give pairs (time, factor) whose first time is 0 and whose times rise"
+        )
     changes = tuple(
         BenchChange(round(FIRST + after, 6), "source.factor", factor) for after, factor in factors
     )

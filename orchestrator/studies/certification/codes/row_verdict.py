@@ -57,8 +57,8 @@ class RowVerdict:
 def try_criteria(code: GridCode[CodeRow], f_n: float) -> None:
     """Judge a response that never moves in every row, so that what cannot be judged is told before the run."""
     for row in code.rows:
-        times = np.arange(0, row.programme(f_n).stop + INTERVAL, INTERVAL)
         try:
+            times = np.arange(0, row.programme(f_n).stop + INTERVAL, INTERVAL)
             with np.errstate(all="ignore"):
                 judge_row(
                     row,

@@ -14,6 +14,7 @@ from orchestrator.studies.certification.codes.all_codes import CODES, MISO
 from orchestrator.studies.certification.codes.bench_point import INTERVAL, BenchResult
 from orchestrator.studies.certification.codes.known import KNOWN, code_for
 from orchestrator.studies.certification.codes.nts631 import NTS
+from orchestrator.studies.certification.codes.programme import voltage
 from orchestrator.studies.certification.codes.row import CodeRow, GridCode
 from orchestrator.studies.certification.codes.row_verdict import judge_row, try_criteria
 
@@ -184,3 +185,17 @@ def test_a_code_that_there_is_not_has_near_ones(gfor, typed, meant):
     assert (f"did you mean {meant}?" if meant else "tr331 (Denmark, 50 Hz)") in " ".join(
         said.split()
     )
+
+
+def test_a_dip_is_pairs_of_a_time_and_a_factor():
+    dip = voltage(5.0, 0.5, ((0.0, 0.7), (0.15, 1.0)), 6.0)
+    assert [(c.time, c.value) for c in dip.changes] == [(1.0, 0.7), (1.15, 1.0)]
+
+
+@pytest.mark.parametrize("factors", [((0.7, 0.0), (1.0, 0.15)), ((0.0, 0.7), (0.0, 1.0)), ()])
+def test_a_dip_that_is_written_the_other_way_round_is_refused(factors):
+    """Read as it stands, it takes the voltage away for good."""
+    dip = replace(MISO.rows[0], name="dip", programme=lambda _: voltage(5.0, 0.5, factors, 6.0))
+    says = r"code 'miso', row 'dip': voltage: .* pairs \(time, factor\) whose first time is 0"
+    with pytest.raises(InputError, match=says):
+        try_criteria(replace(MISO, rows=(dip,)), 60.0)
