@@ -540,3 +540,22 @@ def test_a_class_name_has_one_meaning():
         for name, m in twice.items()
         if not any(within(x, "orchestrator.face.api") for x in m)
     } == {}
+
+
+def test_the_page_knows_every_room_and_where_each_question_is_answered():
+    page = (ROOT / ".docs/explanation/architecture.md").read_text(encoding="utf-8")
+    assert [room for room in sorted({part(m) for m in inside()}) if not _has_row(page, room)] == []
+    _, _, table = page.partition("## Where is it decided?")
+    rows = [row.split("|")[1:4] for row in table.partition("\n## ")[0].splitlines() if "`" in row]
+    assert len(rows) >= 20
+    for question, file, names in rows:
+        text = (ROOT / file.strip(" `")).read_text(encoding="utf-8")
+        for name in re.findall(r"`(\w+)`", names):
+            found = re.search(rf"^(def |class )?{name}\b", text, re.MULTILINE)
+            assert found, f"{question.strip()} {file.strip()} has no {name}"
+
+
+def _has_row(page, room):
+    """Whether a table of the page has a folder, or a file of it."""
+    _, *path = room.split(".")
+    return len(path) < 2 or f"`{'/'.join(path)}" in page
