@@ -1,6 +1,6 @@
 """Differences of one running FMU over one communication step, by perturbing its states and inputs one at a time."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -8,6 +8,9 @@ import numpy as np
 
 from orchestrator.core.arrays import Matrix
 from orchestrator.devices.fmi.component import Component, RealBatch
+
+# change of a state in a step [of max(1, |value|)] up to which the component rests
+RESTS = 1e-9
 
 
 class Differences(NamedTuple):
@@ -18,6 +21,7 @@ class Differences(NamedTuple):
     slopes: Matrix
     after_up: Matrix
     outputs_up: Matrix
+    slopes_up: Matrix
 
 
 @dataclass(frozen=True)
@@ -41,11 +45,16 @@ class PerturbedStep:
         return (*self.states, *self.inputs)
 
     def differences(
-        self, varied: Sequence[int], size: float, rates: Sequence[str] = ()
+        self,
+        varied: Sequence[int],
+        size: float,
+        rates: Sequence[str] = (),
+        unstepped: Collection[int] = (),
     ) -> Differences:
         """Central differences, one column for each perturbed state or input; the component is put back.
 
-        ``size``: of the perturbation, relative to max(1, |value|); ``rates`` are read before the step."""
+        ``size``: of the perturbation, relative to max(1, |value|); ``rates`` are read before the step; ``unstepped``:
+        those of ``varied`` after which no step is done; the caller gives their columns of d(x⁺)."""
         component, names = self.component, self.names
         z_0 = RealBatch(component, names).read().copy()
         after, outputs, slopes = (
@@ -54,7 +63,7 @@ class PerturbedStep:
         columns = tuple(
             np.zeros((len(varied), len(batch.names))) for batch in (after, outputs, slopes)
         )
-        upwards = tuple(np.zeros_like(column) for column in columns[:2])
+        upwards = tuple(np.zeros_like(column) for column in columns)
         saved = component.save_state()
         try:
             outputs_0, slopes_0 = outputs.read().copy(), slopes.read().copy()
@@ -70,11 +79,13 @@ class PerturbedStep:
                     perturbed.write()
                     for batch, column in zip((outputs, slopes), columns[1:], strict=True):
                         column[k] += sign * batch.read()
-                    component.step(self.time, self.step_size)
-                    columns[0][k] += sign * after.read()
+                    if place not in unstepped:
+                        component.step(self.time, self.step_size)
+                        columns[0][k] += sign * after.read()
                     if sign == signs[0]:
                         upwards[0][k] = sign * (after.values - after_0)
                         upwards[1][k] = sign * (outputs.values - outputs_0)
+                        upwards[2][k] = sign * (slopes.values - slopes_0)
                     component.restore_state(saved)
                 if len(signs) == 1:
                     for column, at_rest in zip(
@@ -89,6 +100,35 @@ class PerturbedStep:
             component.restore_state(saved)
             component.free_state(saved)
         return Differences(*(column.T for column in (*columns, *upwards)))
+
+    def moves_at_rest(self) -> bool:
+        """Return whether a step from the operating point itself changes a state by more than `RESTS`."""
+        before, after = self._states_around(np.zeros(len(self.inputs)))
+        return bool((np.abs(after - before) > RESTS * np.maximum(1.0, np.abs(before))).any())
+
+    def response(self, turns: Matrix) -> Matrix:
+        """States' central difference after steps with all inputs moved at once by ±``turns``, shape (n,)."""
+        return (self._states_around(turns)[1] - self._states_around(-turns)[1]) / 2
+
+    def sizes(self, size: float) -> Matrix:
+        """Perturbation of each input, for a size relative to max(1, |value|)."""
+        return size * np.maximum(1.0, np.abs(RealBatch(self.component, self.inputs).read()))
+
+    def _states_around(self, turns: Matrix) -> tuple[Matrix, Matrix]:
+        """States before and after a step whose inputs are moved; the component is put back."""
+        component = self.component
+        inputs, states = RealBatch(component, self.inputs), RealBatch(component, self.states)
+        before = states.read().copy()
+        saved = component.save_state()
+        try:
+            inputs.read()
+            inputs.values += turns
+            inputs.write()
+            component.step(self.time, self.step_size)
+            return before, states.read().copy()
+        finally:
+            component.restore_state(saved)
+            component.free_state(saved)
 
 
 def _allowed_signs(component: Component, name: str, value: float, step: float) -> tuple[float, ...]:

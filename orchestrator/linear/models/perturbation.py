@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Matrix
 from orchestrator.linear.models.differences import Differences, PerturbedStep
+from orchestrator.linear.models.held_response import differences_by_rates
 
 PERTURBATIONS = (1e-5, 1e-6, 1e-7, 1e-8)
 """Central differences are taken with the first and with twice of it, relative to max(1, |value|), and should agree. A
@@ -51,11 +52,16 @@ def perturb(step: PerturbedStep, rates: Sequence[str], *, once: bool = False) ->
         alone = step.differences(columns, PERTURBATIONS[0], rates)
         return PerturbationResult(alone, alone, alone, {}, step.names)
     found: tuple[Differences, Differences] | None = None
+    first = differences_by_rates(step, PERTURBATIONS[0], with_slopes=bool(rates))
     one_sided = np.zeros(len(names), dtype=bool)
     narrow: dict[str, float] = {}
     for size in PERTURBATIONS:
         # The derivatives need no second size: they are differenced over no step.
-        pair = step.differences(columns, size, rates), step.differences(columns, 2 * size)
+        pair = first or (
+            step.differences(columns, size, rates),
+            step.differences(columns, 2 * size),
+        )
+        first = None
         floor = _SMALL * PERTURBATIONS[0] / size
         at_rest = np.eye(len(step.states), len(names))[:, columns]
         one, other = ((d.after - at_rest, d.outputs) for d in pair)
