@@ -28,8 +28,9 @@ S_N = Parameter(
 
 # power of a unit at its operating point beyond which its rating is wrong [pu, S_n]
 LARGEST_POWER = 2.0
-# the same of a machine, whose S_n may be the base of its data alone, as MBASE of PSS/E: 100 MVA for 10 000 MW
-LARGEST_POWER_ON_BASE = 100.0
+# the same of a machine, whose S_n may be the base of its data alone, as MBASE of PSS/E: 100 MVA for an equivalent of
+# 100 GW (the 50-machine system of IEEE has one of 57 GW)
+LARGEST_POWER_ON_BASE = 1000.0
 
 P_0 = Parameter(
     "P_0",

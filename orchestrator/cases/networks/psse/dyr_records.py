@@ -13,6 +13,7 @@ from orchestrator.core.units import LARGEST
 
 MOST_BYTES = 100_000_000  # of a file
 _TOKEN = re.compile(r"""(?P<quoted>'[^']*'|"[^"]*")|(?P<plain>[^\s,'"/]+)|(?P<slash>/)|,""")
+_MODEL = re.compile(r"[A-Za-z]\w{2,}")  # of a DC line, whose name stands where others have a bus
 EVENT = "TOGGLE"  # an event of ANDES, which writes some into its files of dynamics data
 _OWN_MODEL = "USRMDL"  # a user's model, whose name is the first value
 
@@ -25,6 +26,7 @@ class DynamicRecord:
     name: str
     machine: str
     values: tuple[str, ...]
+    line_of_dc: str = ""  # name of the DC line that a record is of, in the place of its bus
 
     @property
     def place(self) -> str:
@@ -39,7 +41,7 @@ def read_dyr(path: Path) -> list[DynamicRecord]:
         raise InputError(f"{path}: it has {size} bytes; at most {MOST_BYTES} are read")
     records: list[DynamicRecord] = []
     tokens: list[str] = []
-    begin = 0
+    begin, names = 0, 0  # names: values in quotes with which the record begins
     for number, line in enumerate(
         visible(read_text(path, MOST_BYTES, errors="replace")).splitlines(), start=1
     ):
@@ -48,11 +50,12 @@ def read_dyr(path: Path) -> list[DynamicRecord]:
         for token in _TOKEN.finditer(line):
             if token["slash"]:
                 if tokens:  # else a comment, or a slash alone
-                    records.append(_record(str(path), begin, tokens))
+                    records.append(_record(str(path), begin, tokens, names))
                 tokens = []
                 break  # what follows on the line is a comment
             if token["quoted"] or token["plain"]:
-                begin = begin if tokens else number
+                begin, names = (begin, names) if tokens else (number, 0)
+                names += bool(token["quoted"]) and names == len(tokens)
                 tokens.append(token["plain"] or token["quoted"][1:-1].strip())
     if tokens:
         raise InputError(
@@ -61,9 +64,12 @@ def read_dyr(path: Path) -> list[DynamicRecord]:
     return records
 
 
-def _record(file: str, line: int, tokens: Sequence[str]) -> DynamicRecord:
+def _record(file: str, line: int, tokens: Sequence[str], names: int) -> DynamicRecord:
     if len(tokens) > 2 and tokens[1].upper() == EVENT:
         return DynamicRecord(file, line, 0, EVENT, tokens[2], tuple(tokens[3:]))
+    if names > 1 and not tokens[0].isdigit() and _MODEL.fullmatch(tokens[1]):
+        name, values = tokens[1].upper(), tuple(tokens[2:])
+        return DynamicRecord(file, line, 0, name, "", values, line_of_dc=tokens[0])
     if len(tokens) < 3 or not re.fullmatch(r"\d{1,9}", tokens[0]):
         raise InputError(
             f"{file}, line {line}: {' '.join(tokens[:4])!r} is no record; one is bus 'MODEL' id values … /"

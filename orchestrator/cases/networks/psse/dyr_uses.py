@@ -74,6 +74,9 @@ def _use_of(
     if record.name == EVENT:
         told = f"an event of ANDES, of {record.machine}; [scenarios] has events"
         return UseOfRecord.NOT_USED, told, False
+    if record.line_of_dc:
+        told = f"a model of the DC line {record.line_of_dc!r}, which is of no machine"
+        return UseOfRecord.NOT_USED, told, True
     kind = kind_of(record.name)
     if kind in OF_MACHINES:
         told = f"the RAW file has no machine {record.machine!r} at bus {record.bus}"

@@ -253,7 +253,7 @@ def _sections(
             continue
         if stripped.upper() == "Q":
             return sections, guessed if named else {}
-        if re.match(r"0\s*(/|$)", stripped):
+        if _END_OF_SECTION.match(stripped):
             named = named or bool(_BEGIN.search(stripped) and name != "system-wide")
             name = _following(path, number, stripped, name, order)
             if not (_BEGIN.search(stripped) or _END.search(stripped)) and name != "end":
@@ -272,6 +272,9 @@ def _sections(
         raise InputError(f"{path}: it ends within its {name} data; export the case once more")
     return sections, guessed if named else {}
 
+
+_END_OF_SECTION = re.compile(r"""(0|'\s*0\s*'|"\s*0\s*")\s*(/|$)""")
+"""A 0 in the place of a record's first value; in quotes where that is a name, as programs write it behind DC lines."""
 
 _NAME = {"switched shunt": 12, "induction machine": 8}
 """Column of NAME, before others that revision 35 has as well."""

@@ -1,6 +1,7 @@
 """Two-terminal DC lines of a PSS/E file, in the state that their controls give."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from orchestrator.cases.form.remedies import without_kinds
@@ -11,6 +12,8 @@ from orchestrator.core.errors import InputError
 _CURRENT = 2  # MDC of a line that holds its current
 _ROUNDS = 500
 _ACCURATE = 1e-12  # change of the current in a round [kA]
+_HALVINGS = 60  # of the range of currents in which both angles are at their least
+_SHORT = 1e-3  # part of its order by which a line may carry less unasked
 _BEYOND = math.radians(0.5)  # by which an angle may exceed its band unasked
 
 
@@ -54,7 +57,8 @@ class TwoTerminal(HeldDevice):
         return tuple(found)
 
     def doubts(self, voltages: Voltages) -> tuple[str, ...]:
-        pole, found = self.pole(voltages), []
+        pole = self.pole(voltages)
+        found = [*self._shortfall(pole)]
         names = ("the rectifier's firing angle", "the inverter's extinction angle")
         for name, (bus, bridges, kilovolts, _) in zip(names, self._ends(pole), strict=True):
             if not bridges.is_known:
@@ -71,6 +75,15 @@ class TwoTerminal(HeldDevice):
                 )
         return tuple(found)
 
+    def _shortfall(self, pole: Pole) -> Iterator[str]:
+        """Yield how much less than its order a line carries."""
+        order = self._order(pole.rectifier_kv, pole.inverter_kv)
+        if pole.current < (1 - _SHORT) * order:
+            yield (
+                f"it carries {pole.rectifier_kv * pole.current:.4g} MW, {pole.current / order:.1%} of its order: "
+                "firing angle at its least; its taps are held, where PSS/E moves them"
+            )
+
     def pole(self, voltages: Voltages) -> Pole:
         """Return the line's state at voltages of its buses.
 
@@ -79,10 +92,7 @@ class TwoTerminal(HeldDevice):
         order = abs(self.setting)
         current = order / 1000 if self.mode == _CURRENT else order / max(self.scheduled_kv, 1e-3)
         for _ in range(_ROUNDS):
-            inverter_kv = min(
-                self.scheduled_kv - self.compounding_ohm * current,
-                self.bridges[1].most_voltage(inverter, current),
-            )
+            inverter_kv = self._inverter_kv(inverter, current)
             rectifier_kv = inverter_kv + self.r_ohm * current
             most = self.bridges[0].most_voltage(rectifier, current)
             is_at_limit = rectifier_kv > most
@@ -95,11 +105,46 @@ class TwoTerminal(HeldDevice):
             if abs(wanted - current) <= _ACCURATE * max(1.0, current):
                 return Pole(current, rectifier_kv, inverter_kv)
             current = (current + wanted) / 2
+        between = self._with_least_angles(rectifier, inverter)
+        if between is not None:
+            return between
         raise InputError(
             f"{self.place}, line {self.line}: the DC line {self.name!r} cannot carry SETVL = {self.setting:g} with "
             f"VSCHD = {self.scheduled_kv:g} kV and RDC = {self.r_ohm:g} ohm at its buses' voltages; mend the record, "
             f"or write {without_kinds([self.section])}"
         )
+
+    def _inverter_kv(self, v_pu: float, current: float) -> float:
+        """Return the DC voltage that the inverter holds [kV]."""
+        scheduled = self.scheduled_kv - self.compounding_ohm * current
+        return min(scheduled, self.bridges[1].most_voltage(v_pu, current))
+
+    def _with_least_angles(self, rectifier: float, inverter: float) -> Pole | None:
+        """Return the state between the whole order and that without the margin, if there is one.
+
+        The rectifier, at its least angle, cannot drive the whole order, and could drive more than the order less the
+        margin. Neither end controls the current then: it is where both ends' voltages meet along the line.
+
+        ``rectifier``, ``inverter``: voltages of their buses [pu]."""
+
+        def excess(current: float) -> float:
+            needed = self._inverter_kv(inverter, current) + self.r_ohm * current
+            return needed - self.bridges[0].most_voltage(rectifier, current)
+
+        least = 0.0
+        most = abs(self.setting) / (1000 if self.mode == _CURRENT else self.scheduled_kv / 2)
+        if not excess(least) < 0 < excess(most):
+            return None
+        for _ in range(_HALVINGS):
+            middle = (least + most) / 2
+            least, most = (middle, most) if excess(middle) < 0 else (least, middle)
+        at_rectifier = self.bridges[0].most_voltage(rectifier, most)
+        at_inverter = at_rectifier - self.r_ohm * most
+        if at_inverter <= 0:
+            return None
+        order = self._order(at_rectifier, at_inverter)
+        is_between = (1 - self.margin) * order <= most <= order
+        return Pole(most, at_rectifier, at_inverter) if is_between else None
 
     def _order(self, rectifier_kv: float, inverter_kv: float) -> float:
         """Return the current that is ordered [kA]."""

@@ -5,7 +5,12 @@ from collections.abc import Iterator, Sequence
 
 from orchestrator.cases.form.schema import LoadModelTable
 from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
-from orchestrator.cases.networks.psse.missing_models import OF_MACHINES, RESTS, kind_of
+from orchestrator.cases.networks.psse.missing_models import (
+    DEVICE,
+    OF_MACHINES,
+    RESTS,
+    kind_of,
+)
 from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
 from orchestrator.cases.networks.source_changes import Changes
 from orchestrator.core.errors import Problem, counted, few
@@ -42,15 +47,18 @@ def unused_models(
     ]
     for name in dict.fromkeys(record.name for record in unused):
         own = [record for record in unused if record.name == name]
-        kind = kind_of(name)
+        kind = DEVICE if own[0].line_of_dc else kind_of(name)
         law = _law(own)
         is_said = bool(law) and said == LoadModelTable.model_validate(
             tomllib.loads(law)["load_model"]
         )
         if kind in _MATTER and not is_said:
             remedy = f"; to take it for all loads, write {law} in [network]" if law else ""
-            buses = few(dict.fromkeys(str(record.bus) for record in own), _MOST_BUSES)
-            text = f"{name} (bus {buses}) is of no machine and not used: {_MATTER[kind]}"
+            places = few(
+                dict.fromkeys(record.line_of_dc or str(record.bus) for record in own), _MOST_BUSES
+            )
+            where = "DC line" if own[0].line_of_dc else "bus"
+            text = f"{name} ({where} {places}) is of no machine and not used: {_MATTER[kind]}"
             for record in own:
                 changes.note(record.line, text + remedy)
     for record in _named_in(records, uses, RESTS):
@@ -73,7 +81,7 @@ def _strays(records: Sequence[DynamicRecord], unused: Sequence[DynamicRecord]) -
     """Yield one question about all records of machines that the RAW file lacks, which PSS/E passes over too.
 
     ``unused``: the records of no machine, among ``records``."""
-    strays = [record for record in unused if kind_of(record.name) in OF_MACHINES]
+    strays = [r for r in unused if kind_of(r.name) in OF_MACHINES and not r.line_of_dc]
     if not strays:
         return
     apart = {(record.bus, record.machine) for record in unused}

@@ -6,6 +6,7 @@ the power at their buses by the voltages and the network in the file."""
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 
@@ -103,6 +104,47 @@ def test_a_rectifier_at_its_least_angle_carries_the_power_at_a_lower_voltage():
 def test_a_line_at_its_least_angle_gives_way_by_its_margin():
     (one, _) = fed(AT_LEAST_ANGLE, {1: 0.86305, 2: 0.93574})
     assert one.real == pytest.approx(-27.0, abs=1e-6)
+
+
+SHANDONG = replace(
+    line(
+        4000.0,
+        3.51,
+        800.0,
+        0.0,
+        (
+            bridges(2, 3.8579, 525.0, 0.5714, 0.925, 15, 90),
+            bridges(2, 3.8579, 1050.0, 0.2857, 0.95, 15, 90),
+        ),
+        least=500.0,
+    ),
+    margin=0.15,
+)
+"""A line of the 133-bus system of Shandong University, at its buses' voltages."""
+
+
+def test_both_angles_at_their_least_settle_between_the_order_and_its_margin():
+    """With bridges alike the overlaps cancel: R·I is the difference of both ends' voltages at no load."""
+    device, voltages = SHANDONG, {1: 0.99509, 2: 1.00171}
+    no_load = 2 * 3 * math.sqrt(2) / math.pi * math.cos(math.radians(15))
+    ends = (
+        no_load * 0.99509 * 525.0 * 0.5714 / 0.925,
+        no_load * 1.00171 * 1050.0 * 0.2857 / 0.95,
+    )
+    pole = device.pole(voltages)
+    assert pole.current == pytest.approx((ends[0] - ends[1]) / 3.51, rel=1e-9)
+    assert 0.85 < pole.current * pole.rectifier_kv / 4000.0 < 1.0
+    (said,) = device.doubts(voltages)
+    assert said.startswith("it carries 38")
+    assert "its taps are held, where PSS/E moves them" in said
+
+
+def test_a_line_gives_way_without_a_jump():
+    """From the whole order to that without its margin, as the rectifier's voltage falls."""
+    falling = [SHANDONG.pole({1: 0.996 - 1e-4 * k, 2: 1.00171}).current for k in range(60)]
+    assert falling[0] * 806 == pytest.approx(4000.0, rel=0.01)
+    assert falling[-1] < 0.88 * falling[0]
+    assert max(abs(a - b) for a, b in pairwise(falling)) < 0.03
 
 
 def test_converters_with_commutating_capacitors_draw_what_psse_says():

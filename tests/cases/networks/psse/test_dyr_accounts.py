@@ -76,6 +76,33 @@ def test_models_that_are_missing_are_one_table(tmp_path):
     )
 
 
+DC_LINES = """\
+'NORTH-SOUTH', 'CDC4T', 5, 5, 0.1, 0.1, 0.6, 0.65,
+   60, 640 /
+"Link 2 " "VSCHVDCP0 " /
+"""
+
+
+def test_models_of_dc_lines_are_passed_over_and_asked_about(tmp_path):
+    """They begin with the line's name, where others have a bus."""
+    records = read(tmp_path, CLASSICAL + DC_LINES)
+    assert set(machine_models(records, MACHINES)) == {(bus, "1") for bus in (1, 2, 3)}
+    uses = record_uses(records, {(bus, "1") for bus in (1, 2, 3)}, ())
+    assert [use.why for use in uses[3:]] == [
+        "a model of the DC line 'NORTH-SOUTH', which is of no machine",
+        "a model of the DC line 'Link 2', which is of no machine",
+    ]
+    first, second = (str(question) for question in unused_models(records, uses))
+    assert "line 4: CDC4T (DC line NORTH-SOUTH) is of no machine and not used: what it" in first
+    assert "line 6: VSCHVDCP0 (DC line Link 2)" in second
+
+
+@pytest.mark.parametrize("bus", ["A1", "'A1'"])
+def test_a_bus_that_is_no_number_is_no_dc_line(tmp_path, bus):
+    with pytest.raises(InputError, match=r"'A1 GENCLS 1 4\.0' is no record; one is bus 'MODEL' id"):
+        read(tmp_path, f"{bus} GENCLS 1 4.0 0.0 /\n")
+
+
 @pytest.mark.parametrize("leaving_out", [(), ("GENQEC1",)])
 def test_a_machines_own_record_is_never_offered_to_go(tmp_path, leaving_out):
     text = refusal(tmp_path, CLASSICAL.replace("3 'GENCLS'", "3 'GENQEC1'"), leaving_out)

@@ -72,8 +72,10 @@ def prepared(tmp_path):
     return scenario
 
 
-def test_the_modes_do_not_depend_on_the_base_of_the_data(prepared):
-    own, other = (compute_modes(prepared(*bases)) for bases in ((900.0, 600.0), (100.0, 100.0)))
+@pytest.mark.parametrize("base", [100.0, 2.0])
+def test_the_modes_do_not_depend_on_the_base_of_the_data(prepared, base):
+    """With 2 MVA the machine in the west feeds 350 pu: equivalents of whole areas have such bases."""
+    own, other = (compute_modes(prepared(*bases)) for bases in ((900.0, 600.0), (base, base)))
     found, wanted = (np.sort_complex([mode.eigenvalue for mode in x.modes]) for x in (other, own))
     assert found == pytest.approx(wanted, rel=1e-6, abs=1e-6)
 

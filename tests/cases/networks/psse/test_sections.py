@@ -45,6 +45,20 @@ def test_nothing_is_said_where_the_order_is_all_there_is(tmp_path):
     assert len(found.tables.branch) == 9  # before, what follows such a line was no data of any kind
 
 
+@pytest.mark.parametrize("zero", ["'0'", '"0"', "'0 '"])
+def test_a_zero_in_quotes_ends_a_section(tmp_path, zero):
+    """DC lines and FACTS devices begin with a name in quotes, and STEPS writes their end so as well."""
+    text = raw(33)
+    lines = [
+        zero + line[1:] if "END OF TWO-TERMINAL DC" in line or "END OF FACTS" in line else line
+        for line in text.splitlines()
+    ]
+    assert lines != text.splitlines()
+    found = read(tmp_path, "\n".join(lines))
+    assert (found.tables.bus == read(tmp_path, text).tables.bus).all()
+    assert not found.changes
+
+
 def test_an_end_that_contradicts_the_order_is_an_error(tmp_path):
     """A section is missing before a silent line: all that follows would be taken for something else."""
     lines = silent(raw(33), "LOAD", "FIXED SHUNT").splitlines()
