@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.core.arrays import Matrix
+from orchestrator.core.arrays import Matrix, Vector
 from orchestrator.linear.models.differences import Differences, PerturbedStep
 from orchestrator.linear.models.held_response import differences_by_rates
 
@@ -28,6 +28,10 @@ _EVEN = 0.1
 """An element whose answers up and down differ by more than this part belongs to a limit on one side; in smooth systems
 it is at most 0.05."""
 
+_FAR = 1e-3
+"""Movement of a state [pu] in a step, or of an output, by which a limit that it meets is not at the operating point:
+the perturbation is multiplied by a large gain, such as that of a stabiliser before a regulator with a derivative."""
+
 
 @dataclass(frozen=True)
 class PerturbationResult:
@@ -43,7 +47,8 @@ class PerturbationResult:
 def perturb(step: PerturbedStep, rates: Sequence[str], *, once: bool = False) -> PerturbationResult:
     """Perturb every state and input, with smaller sizes where two sizes disagree.
 
-    What answers differently up and down keeps the answer upwards of the usual size: a limit is that close.
+    What answers differently up and down keeps the answer upwards of the usual size: a limit is that close. Where a gain
+    carries the usual size to a limit that is far away, a smaller one tells that both sides are alike.
 
     ``once``: with the usual size alone, for a direction to search in; nothing is known to agree then."""
     names, h = step.names, step.step_size
@@ -70,7 +75,11 @@ def perturb(step: PerturbedStep, rates: Sequence[str], *, once: bool = False) ->
             found, usual = pair, Differences(*(part.copy() for part in pair[1]))
             upwards = pair[0].after_up - at_rest, pair[0].outputs_up
             one_sided = _apart(one, upwards, _EVEN, floor * h, floor)
+            distant = one_sided & (_movement(one) * size > _FAR)
         else:
+            upwards = pair[0].after_up - at_rest, pair[0].outputs_up
+            even = ~_apart(one, upwards, _EVEN, floor * h, floor) & ~apart
+            one_sided[columns] &= ~(even & distant[columns])
             for kept, new in zip(found, pair, strict=True):
                 _take_over(kept, new, columns, ~apart, one_sided)
             narrow |= {
@@ -82,6 +91,11 @@ def perturb(step: PerturbedStep, rates: Sequence[str], *, once: bool = False) ->
     assert found is not None
     doubtful = tuple(name for k, name in enumerate(names) if k in columns or one_sided[k])
     return PerturbationResult(*found, usual, narrow, doubtful)
+
+
+def _movement(answer: tuple[Matrix, Matrix]) -> Vector:
+    """Return the largest movement per unit in each column of an answer, of the states or of the outputs."""
+    return np.asarray(np.abs(np.vstack(answer)).max(axis=0, initial=0.0))
 
 
 def without_curvature(

@@ -30,6 +30,7 @@ SHAPES = {
     "dead_band": lambda u: u - fmax(-1.5e-5, fmin(1.5e-5, u)),
     "saturated": lambda u: fmax(-3e-7, fmin(3e-7, u)),
     "rough": lambda u: u + 1e-7 * sin(1e6 * u),
+    "distant_limit": lambda u: fmax(-2.0, fmin(8.0, 1e6 * u)),
     "one_way_lead": lambda u: u + 0.02 * fabs(u),
 }
 
@@ -45,11 +46,11 @@ def shaped(name):
     return read_description(cached(PythonFmu(m.build())))
 
 
-def judged(shape, other=None):
+def judged(shape, other=None, back=-3.0):
     """What is said of a ring of two integrators, f ≈ 0.5 Hz, one of them or both behind a characteristic."""
     system = System()
     system.add("shaped", shaped(shape), {"gain": 3.0})
-    system.add("plain", shaped(other) if other else small_fmu("integrator"), {"gain": -3.0})
+    system.add("plain", shaped(other) if other else small_fmu("integrator"), {"gain": back})
     system.connect("shaped.y", "plain.u")
     system.connect("plain.y", "shaped.u")
     schedule = gauss_seidel((("shaped",), ("plain",)))
@@ -97,6 +98,14 @@ def test_a_limit_close_by_does_not_change_the_modes():
     (doubt,), modes = judged("saturated")
     assert modes[0].eigenvalue == pytest.approx(3j, abs=0.01)
     assert not doubt.turns
+
+
+def test_a_limit_far_away_behind_a_large_gain_is_no_edge():
+    """The usual perturbation, times the gain, meets both limits, which stand apart; at rest neither is near."""
+    found, modes = judged("distant_limit", back=-3e-6)
+    assert modes[0].eigenvalue == pytest.approx(3j, abs=0.01)
+    assert not any(doubt.turns for doubt in found)
+    assert "up and down" not in " ".join(map(str, found))
 
 
 def test_one_sentence_counts_the_components_of_a_kind():
