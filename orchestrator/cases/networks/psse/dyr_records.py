@@ -41,7 +41,8 @@ def read_dyr(path: Path) -> list[DynamicRecord]:
         raise InputError(f"{path}: it has {size} bytes; at most {MOST_BYTES} are read")
     records: list[DynamicRecord] = []
     tokens: list[str] = []
-    begin, names = 0, 0  # names: values in quotes with which the record begins
+    begin = 0
+    names = 0  # values in quotes with which the record begins
     for number, line in enumerate(
         visible(read_text(path, MOST_BYTES, errors="replace")).splitlines(), start=1
     ):
