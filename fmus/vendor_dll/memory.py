@@ -21,6 +21,8 @@ def unheard(_doing: str) -> None:
 
 
 class LibraryEndedError(ValueError):
+    """The process that holds a DLL has ended; ``passing``: for a reason of this moment, and a try may succeed."""
+
     def __init__(self, words: str, *, passing: bool = False) -> None:
         super().__init__(words)
         self.passing = passing

@@ -291,7 +291,7 @@ def _units(table: str, guess: Guess | None) -> list[str]:
 
 
 def _unit(info: VariableInfo, such_as: str) -> list[str]:
-    if not hints.undeclared(info):
+    if not hints.lacks_unit(info):
         return []
     unit = hints.likely_unit(info)
     if unit:

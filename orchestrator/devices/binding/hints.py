@@ -9,6 +9,7 @@ WATTS = ("W", "kW", "MW", "GW", "var", "kvar", "Mvar", "VA", "kVA", "MVA", "VAr"
 _KNOWN = {*VOLTS, *AMPERES, *WATTS, "pu", "p.u.", "deg", "rad", "Hz", "rad/s"}
 _BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]+?)\s*[\])]")
 
+# what a description of a start value says, by our name for the value
 START_TEXTS = {
     "P_0": re.compile(
         r"\bactive power\b.*(start|init)|(start|init)\w* active power", re.IGNORECASE
@@ -28,13 +29,14 @@ _DRAWN = re.compile(
 )
 
 
-def undeclared(info: VariableInfo) -> bool:
+def lacks_unit(info: VariableInfo) -> bool:
+    """Return whether an FMU declares no unit for a variable, or one that says nothing."""
     return info.unit in ("", "1", "-")
 
 
 def likely_unit(info: VariableInfo) -> str:
     """The declared unit, or else one that stands in brackets in the description; "" where neither is known."""
-    if not undeclared(info):
+    if not lacks_unit(info):
         return info.unit
     return next(
         (text for text in reversed(_BRACKETS.findall(info.description)) if text in _KNOWN), ""
@@ -57,6 +59,7 @@ def kind_of_voltage(text: str) -> str:
 
 
 def kind_of_current(text: str) -> str:
+    """Kind of an alternating current that a description names, ``peak`` or ``rms``; "" where it does not."""
     return _size(text.lower())
 
 

@@ -13,11 +13,11 @@ from orchestrator.studies.oscillations.onset import Onset, onset_of
 LOWEST_HZ = 0.08
 HIGHEST_HZ = 8.0
 # power of a line beside the median of its neighbours: a mode that noise shakes seldom reaches it
-_ABOVE = 35.0
-_MOST = 6
+_LEAST_ABOVE_NOISE = 35.0
+_MOST_LINES = 6  # oscillations that are told, the strongest first
 _LEAST_SHARE = 0.01  # part of the strongest oscillation's power from which on a weaker one is told
 _AS_CLEAR = 0.1  # power beside its noise, as a part of that of the clearest signal
-_PERIODS = 6  # fewest periods in a record
+_FEWEST_PERIODS = 6  # in a record
 
 
 @dataclass(frozen=True)
@@ -62,9 +62,10 @@ def signals_of(measured: Measurements) -> Signals:
 
 
 def find_oscillations(signals: Signals) -> list[SpectralLine]:
-    """Lines of the spectrum of any signal or of their mean, the strongest in all first; multiples of one belong to it.
+    """Find the lines in the spectrum of any signal, or of the signals' mean; the strongest in all comes first.
 
-    Of m signals one must exceed the noise by log2(m) more: noise exceeds x times its median with the chance 2^-x."""
+    A line at a multiple of a stronger one's frequency is no oscillation of its own, but a harmonic of that one. Of m
+    signals one must exceed the noise by log2(m) more: noise exceeds x times its median with the chance 2^-x."""
     step, count = float(signals.times[1] - signals.times[0]), len(signals.names)
     length = len(signals.times) * step
     grid, each = spectra(signals.values, step)
@@ -73,29 +74,29 @@ def find_oscillations(signals: Signals) -> list[SpectralLine]:
     highest = np.lib.stride_tricks.sliding_window_view(
         np.pad(each, ((12, 12), (0, 0))), 25, axis=0
     ).max(axis=-1)
-    low, high = max(LOWEST_HZ, _PERIODS / length), min(HIGHEST_HZ, 0.4 / step)
+    low, high = max(LOWEST_HZ, _FEWEST_PERIODS / length), min(HIGHEST_HZ, 0.4 / step)
     at, column = np.nonzero((each == highest) & ((grid >= low) & (grid <= high))[:, None])
     above = each[at, column] / _background(each, at, column) - np.where(
         column > 0, np.log2(count), 0.0
     )
     lines: dict[int, dict[int, float]] = {}
-    for j in np.argsort(-above)[: (above > _ABOVE).sum()]:
+    for j in np.argsort(-above)[: (above > _LEAST_ABOVE_NOISE).sum()]:
         lines.setdefault(int(at[j]), {})[int(column[j]) - 1] = float(above[j])
     strongest = sorted(lines, key=lambda k: -power[k])
-    kept, found = list[float](), list[SpectralLine]()
+    frequencies, found = list[float](), list[SpectralLine]()
     for k in strongest:
-        clear = all(abs(grid[k] - other) * length > 3 for other in kept)
-        if power[k] < _LEAST_SHARE * power[strongest[0]] or not clear or len(found) == _MOST:
+        apart = all(abs(grid[k] - other) * length > 3 for other in frequencies)
+        if power[k] < _LEAST_SHARE * power[strongest[0]] or not apart or len(found) == _MOST_LINES:
             continue
         shown = {signal: size for signal, size in lines[k].items() if signal >= 0}
         frequency = refined(signals, [*shown] or [*range(count)], float(grid[k]))
-        kept.append(frequency)
-        base = next((o for o in found if _multiple(frequency, o.frequency, length)), None)
+        frequencies.append(frequency)
+        base = next((o for o in found if _is_multiple(frequency, o.frequency, length)), None)
         if base:
             order = round(frequency / base.frequency)
-            base.harmonics[order] = _relative(signals, base, order)
+            base.harmonics[order] = _harmonic_share(signals, base, order)
         else:
-            found.append(_described(signals, frequency, shown))
+            found.append(_describe_line(signals, frequency, shown))
     return found
 
 
@@ -128,19 +129,20 @@ def refined(signals: Signals, columns: list[int], guess: float) -> float:
     window = np.hanning(len(strong))[:, None]
     t = signals.times - signals.times.mean()
 
-    def missing(frequency: float) -> float:
+    def unexplained(frequency: float) -> float:
         return -float(
             (np.abs((strong * window).T @ np.exp(-2j * np.pi * frequency * t)) ** 2).sum()
         )
 
     near = 1 / (t[-1] - t[0])
     best = minimize_scalar(
-        missing, bounds=(guess - near, guess + near), method="bounded", options={"xatol": 1e-6}
+        unexplained, bounds=(guess - near, guess + near), method="bounded", options={"xatol": 1e-6}
     )
     return float(best.x)
 
 
-def _multiple(frequency: float, base: float, length: float) -> bool:
+def _is_multiple(frequency: float, base: float, length: float) -> bool:
+    """Return whether a frequency is a multiple of another one, as far as a record of that length [s] can tell."""
     order = round(frequency / base)
     return order >= 2 and abs(frequency - order * base) * length < 1
 
@@ -169,7 +171,10 @@ def envelope(
     return np.convolve(turned, 2 * window / window.sum(), mode="valid"), half
 
 
-def _described(signals: Signals, frequency: float, shown: dict[int, float]) -> SpectralLine:
+def _describe_line(signals: Signals, frequency: float, shown: dict[int, float]) -> SpectralLine:
+    """Describe an oscillation: amplitudes, and its begin and end from the envelope of the signal that shows it best.
+
+    ``shown``: by the numbers of the signals that show it by themselves, its power beside the noise."""
     amplitude = np.abs(phasors(signals.times, signals.values, [frequency]))
     size = amplitude / np.maximum(signals.values.std(axis=0), 1e-300)
     order = [*shown, *(int(k) for k in np.argsort(-size) if k not in shown)]
@@ -198,7 +203,7 @@ def _described(signals: Signals, frequency: float, shown: dict[int, float]) -> S
     )
 
 
-def _relative(signals: Signals, base: SpectralLine, order: int) -> float:
+def _harmonic_share(signals: Signals, base: SpectralLine, order: int) -> float:
     """Largest amplitude of a multiple beside that of the oscillation itself, among the signals that show it well."""
     used = slice(base.first, base.last)
     t, x = signals.times[used], signals.values[used]

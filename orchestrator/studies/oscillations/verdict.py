@@ -71,6 +71,7 @@ class Evidence:
 
 
 def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
+    """Return the figures of an oscillation's envelope, and the kind of oscillation that they speak for."""
     f, step = found.frequency, float(signals.times[1] - signals.times[0])
     settle = 0 if found.begin is None else round(2 / (f * step))
     used = slice(min(found.first + settle, found.last - 2), found.last)
@@ -147,6 +148,10 @@ def forced_frequencies(times: Numbers, names: Sequence[str], values: Numbers) ->
 def _judge(
     seen: Evidence, change: float, pair: float, found: SpectralLine
 ) -> tuple[OscillationKind, list[str]]:
+    """Return the kind and the reasons for it, in words.
+
+    ``change``: of the amplitude over the record, as a part of it, if an exponential explains the envelope; else 0.
+    ``pair``: part of the envelope's power that two sines at close frequencies explain."""
     harmonics = ", ".join(
         f"{order} x ({100 * part:.0f} %)" for order, part in found.harmonics.items()
     )
@@ -217,8 +222,8 @@ def _disturbed(signals: Signals, found: SpectralLine) -> bool:
     return False
 
 
-_SHOWN = 8
-_FEWEST_TOLD = 5  # of an oscillation that is told
+_SHOWN = 8  # signals whose amplitudes the JSON has
+_FEWEST_TOLD = 5  # periods from which on an oscillation is told
 
 
 @dataclass(frozen=True)
@@ -258,7 +263,9 @@ class Located:
 
 
 def locate(measured: Measurements, models: UnitModels | None = None) -> list[Located]:
-    """Return what is there; with the linear models of a case's units, these decide."""
+    """Return each oscillation of a record, with its kind and its source.
+
+    ``models``: linear models of a case's units; if they are given and fit, they decide which unit drives it."""
     signals = signals_of(measured)
     found = [
         one for one in find_oscillations(signals) if one.periods(measured.interval) >= _FEWEST_TOLD

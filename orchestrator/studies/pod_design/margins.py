@@ -44,6 +44,7 @@ class LoopMargins:
 
 
 def loop_margins(half: LinearModel, full: LinearModel) -> LoopMargins:
+    """Return the margins of a loop from the continuous models with half of its gain and with all of it."""
     if full.step_size is not None or full.names != half.names:
         raise ValueError("the margins of a loop need two continuous models with the same states")
     if np.linalg.eigvals(full.A).real.max() > ZERO:
@@ -115,9 +116,9 @@ def _crossings(around: _Loop, grid: Vector, values: Vector) -> Iterator[tuple[fl
             yield w, complex(around.eigenvalues(w)[k])
 
 
-_STRIDE = 2**0.5
-_REACH = 8.0  # gains from 1/8 to 8 times the designed one are tried, a factor √2 apart
-_HALVINGS = 4
+_STRIDE = 2**0.5  # factor between two gains that are tried
+_REACH = 8.0  # gains from 1/8 to 8 times the designed one are tried
+_HALVINGS = 4  # of the step in which a mode is lost: the edge is known to 3 %
 VARIATION = 0.2  # relative change of K, T_S1 and T_S2, one at a time
 LARGER_GAIN = f"K {100 * VARIATION:+.0f} %"
 
@@ -145,6 +146,11 @@ class Margins:
 def compute_margins(
     loop: PodLoop, off: Placed, nominal: Placed, least: float, report: Callable[[str], None]
 ) -> Margins:
+    """Return how far the gain may be changed, the margins of the loop, and what other values do to the target.
+
+    ``off``, ``nominal``: the target without the POD and with the designed setting.
+    ``least``: damping ratio that every mode should keep; a design that does not reach it keeps its own.
+    ``report``: is told what is computed."""
     weakest, fastest = _extremes(loop, nominal.setting)
     limit, growth = min(least, damping_ratio(weakest)), fastest.real if fastest else 0.0
 
@@ -158,7 +164,7 @@ def compute_margins(
 
     (up, lost_up), (down, lost_down) = (_edge(lost, stride) for stride in (_STRIDE, 1 / _STRIDE))
     report("margins: phase and delay")
-    found, why = _of_loop(loop, nominal.setting)
+    found, why = _margins_of_loop(loop, nominal.setting)
     report("margins: other values of the setting")
     varied = _variations(loop, off, nominal.setting)
     return Margins(
@@ -185,7 +191,7 @@ def _extremes(loop: PodLoop, setting: PodSetting) -> tuple[complex, complex | No
     return complex(found["weakest"]), next(iter(found["fastest"].tolist()), None)
 
 
-def _of_loop(loop: PodLoop, setting: PodSetting) -> tuple[LoopMargins | None, str]:
+def _margins_of_loop(loop: PodLoop, setting: PodSetting) -> tuple[LoopMargins | None, str]:
     try:
         return loop_margins(*loop.continuous_models(setting)), ""
     except AnalysisError as error:

@@ -5,8 +5,8 @@ import pytest
 
 from orchestrator.studies.oscillations.detection import (
     Signals,
-    _described,
-    _multiple,
+    _describe_line,
+    _is_multiple,
     find_oscillations,
     signals_of,
 )
@@ -43,7 +43,7 @@ def test_the_mode_at_the_frequency_that_was_found_is_taken(frequency, place):
 def test_an_oscillation_that_begins_later_is_measured_from_its_begin_on():
     t = np.arange(0, 60, 0.05)
     values = np.where(t >= 20, np.sin(2 * np.pi * 0.5 * t), 0.0)[:, None]
-    found = _described(Signals(t, ("x",), values), 0.5, {})
+    found = _describe_line(Signals(t, ("x",), values), 0.5, {})
     assert found.begin == pytest.approx(20, abs=3)
     assert t[found.first] == found.begin
 
@@ -53,4 +53,4 @@ def test_an_oscillation_that_begins_later_is_measured_from_its_begin_on():
     [(1.0, True), (1.51, True), (0.5, False), (0.51, False), (1.25, False), (1.04, False)],
 )
 def test_a_multiple_is_at_least_twice_the_frequency_and_as_close_as_can_be_told(hertz, multiple):
-    assert _multiple(hertz, 0.5, 60.0) is multiple
+    assert _is_multiple(hertz, 0.5, 60.0) is multiple

@@ -13,6 +13,8 @@ IMPEDANCE = 3
 
 @dataclass(frozen=True)
 class FactsDevice(HeldDevice):
+    """A FACTS device: its shunt part holds a voltage, its series part lets a power flow on to another bus."""
+
     sending: int  # the bus of the shunt part
     terminal: int  # the bus behind the series part; 0 for none
     mode: int
@@ -31,6 +33,7 @@ class FactsDevice(HeldDevice):
         return (self.sending, self.terminal) if self.terminal else (self.sending,)
 
     def endings(self, voltages: Voltages) -> tuple[DeviceEnd, ...]:
+        """Return what the device gives at the sending bus, and behind its series part where that sets a power."""
         v = abs(voltages[self.sending])
         held = v if self.is_remote else self.v_pu
         fed = series = 0j  # series: power that flows into the series part

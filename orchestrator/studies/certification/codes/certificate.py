@@ -25,14 +25,19 @@ def certify_code(
     rows: Sequence[str] = (),
     report: CountReport = nobody,
 ) -> Certificate:
+    """Run a code's rows with the converter on the test bench, and judge each of them.
+
+    ``rows``: names of the only rows that run; all where empty.
+
+    Raises an `InputError` if a criterion cannot judge its row, before anything runs."""
     request.check()
     f_n = rated_frequency(request, code.f_n)
     try_criteria(code, f_n)
     chosen = [row for row in code.rows if not rows or row.name in rows]
     with refusing(request, folder, "on the test bench of `gfor certify --code`") as trial:
-        _laid(request, chosen[:1], f_n, trial)
+        _prepare_rows(request, chosen[:1], f_n, trial)
     report(0, len(chosen))
-    prepared = _laid(request, chosen, f_n, folder)
+    prepared = _prepare_rows(request, chosen, f_n, folder)
     tasks = [
         BenchTask(StudyCase.of(one), row.name) for one, row in zip(prepared, chosen, strict=True)
     ]
@@ -53,9 +58,10 @@ def certify_code(
     )
 
 
-def _laid(
+def _prepare_rows(
     request: CertificationRequest, rows: Sequence[CodeRow], f_n: float, folder: Path
 ) -> list[PreparedScenario]:
+    """Write a case file for each row, with what it needs beside it, and prepare its scenario."""
     lay_files(request, folder)
     written = [
         write_row(request, row.name, row.title, row.programme(f_n), f_n, folder) for row in rows

@@ -20,6 +20,8 @@ NOT_JUDGED = "not judged"  # the response allows none
 
 @dataclass(frozen=True)
 class RowVerdict:
+    """A row with a finding for each criterion; ``unknown``: why nothing is known of it, as the run failed."""
+
     row: CodeRow
     findings: tuple[RowFinding, ...] = ()
     unknown: str = ""
@@ -92,21 +94,7 @@ def judge_row(
         source_angle=programme.source_angle(result.times, f_n),
     )
     if len(result.times) < 2 or result.times[-1] < programme.stop - 2e-3:
-        ended = float(result.times[-1]) if len(result.times) else 0.0
-        text = "; ".join(measured.faults) or f"the run ended at {ended:g} s"
-        rule = "the converter runs to the end"
-        found: Sequence[RowFinding] = [
-            RowFinding(
-                "runs",
-                rule,
-                origin="reading",
-                value=ended,
-                limit=programme.stop,
-                margin=None,
-                accepted=False,
-                text=text,
-            )
-        ]
+        found: Sequence[RowFinding] = [_ended_early(result, measured, programme.stop)]
     else:
         found = [judge(measured) for judge in row.criteria]
         current = carries()(measured) if {"q", "v"} <= set(result.signals) else None
@@ -126,3 +114,18 @@ def judge_row(
     if row.shown_only:
         return RowVerdict(row, tuple(replace(finding, accepted=None) for finding in found))
     return RowVerdict(row, tuple(found))
+
+
+def _ended_early(result: BenchResult, measured: MeasuredRow, stop: float) -> RowFinding:
+    """The finding on a run that ended before its time [s]."""
+    ended = float(result.times[-1]) if len(result.times) else 0.0
+    return RowFinding(
+        "runs",
+        "the converter runs to the end",
+        origin="reading",
+        value=ended,
+        limit=stop,
+        margin=None,
+        accepted=False,
+        text="; ".join(measured.faults) or f"the run ended at {ended:g} s",
+    )
