@@ -214,7 +214,9 @@ class CaseError(InputError):
         self.problems = tuple(problems)
         kinds = {problem.kind for problem in problems}
         self.words_of_others = next(filter(None, (p.words_of_others for p in problems)), "")
-        count = f"{len(problems)} problem" + ("s" if len(problems) != 1 else "")
+        asked = sum(problem.besides for problem in problems)
+        count = counted(len(problems) - asked, "problem")
+        count += f", and {counted(asked, 'question')} besides" if asked else ""
         message = f"{source}: {count}\n" + "\n".join(f"  - {problem}" for problem in problems)
         super().__init__(message, kind=kinds.pop() if len(kinds) == 1 else ErrorKind.VALUES)
 

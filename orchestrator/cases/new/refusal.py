@@ -53,8 +53,9 @@ def _move_place(
 ) -> Problem:
     """Return a problem at the option or the file that its key comes from; its text may name the file already."""
     found = _PLACE.match(problem.place)
-    if found is None:
-        return problem
+    file = problem.place.partition(",")[0]
+    if found is None or any(path.name == Path(file).name for path in sources.values()):
+        return problem  # at a value of a file already
     table, key = found[1], found[2] or ""
     option = _option(table, key, options)
     network = next(path.name for key, path in sources.items() if key != "dyr")

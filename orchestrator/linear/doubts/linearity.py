@@ -15,6 +15,7 @@ from orchestrator.core.arrays import Vector
 from orchestrator.core.errors import few
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.linearization import Blocks, compose
+from orchestrator.linear.models.perturbation import PERTURBATIONS
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.linear.spectra.stability import SLOW
 from orchestrator.systems.coupling.schedule import Schedule
@@ -66,6 +67,12 @@ class Doubt:
     def reason(self) -> str:
         """Why, and how far that moves which mode."""
         m = self.mode
+        if self.kind == _SMALL_ONLY:
+            return (
+                f"{self.why}. The modes are those of small changes; a perturbation of {2 * PERTURBATIONS[0]:g} would "
+                f"move the mode at {m.frequency_hz:.3f} Hz with {m.damping_percent:.2f} % damping by "
+                f"{100 * self.shift:.2g} % of its eigenvalue; {100 * LARGEST_SHIFT:g} % is normal"
+            )
         return (
             f"{self.why}. That moves the mode at {m.frequency_hz:.3f} Hz with {m.damping_percent:.2f} % damping by "
             f"{100 * self.shift:.2g} % of its eigenvalue, and its damping by up to {100 * self.shift:.2g} points; "

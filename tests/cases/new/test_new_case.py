@@ -288,6 +288,21 @@ def test_a_refusal_of_the_file_names_its_line(gfor, files):
     assert re.search(r"- \S*five\.raw, line \d+: ", err)
 
 
+def test_a_refusal_of_a_value_names_its_machine_and_counts_no_question(gfor, files):
+    dyr = files[1]
+    dyr.write_text(
+        re.sub(r"('GEN\w+'.*?)(\d\.\d+)(?= 0\.0 )", r"\g<1>-5.0", dyr.read_text(), count=1)
+    )
+    code, _, err = gfor(*files)
+    assert code == 2
+    said = " ".join(err.split())
+    assert re.search(
+        r"- \S*five\.dyr, line \d+, sg\d\.machine\.H: machine\.H = -5 s; it must be at least", said
+    )
+    asked = said.count("questioned besides")
+    assert f"five.dyr: 1 problem, and {asked} question" in said
+
+
 def test_without_a_converter(files):
     case, new = made(files, None)
     assert [prepared.name for prepared in new.scenarios] == ["base", "fault"]

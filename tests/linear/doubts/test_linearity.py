@@ -98,6 +98,7 @@ def test_a_limit_close_by_does_not_change_the_modes():
     (doubt,), modes = judged("saturated")
     assert modes[0].eigenvalue == pytest.approx(3j, abs=0.01)
     assert not doubt.turns
+    assert "The modes are those of small changes; a perturbation of 2e-05 would move" in str(doubt)
 
 
 def test_a_limit_far_away_behind_a_large_gain_is_no_edge():
