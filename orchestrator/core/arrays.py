@@ -9,3 +9,4 @@ Numbers = NDArray[np.float64]  # real numbers, of any shape
 Matrix = NDArray[np.float64]  # real numbers in rows and columns
 Complex = NDArray[np.complex128]  # complex numbers, of any shape
 Vector = NDArray[Any]  # real or complex numbers
+Flags = NDArray[np.bool_]  # yes or no, of any shape

@@ -44,6 +44,8 @@ _FORMS = {
     "power": Form.POWER,
 }
 _FREQUENCY = ("omega", "frequency")
+_POWER = ("delta_p_pod", "delta_q_pod", "pod_p.limit", "pod_q.limit")  # [pu, S_n]
+_OF_POWER = ("W", "var", "VA")  # ends of units of power
 _SWITCH = ".enabled"  # end of our names of Boolean variables, such as ``pod_p.enabled``
 
 
@@ -328,6 +330,11 @@ class _Reader:
                 PER_UNIT,
             )
         plain = table.unit is None and info.unit == "1"
+        if name in _POWER and not plain:
+            unit = unit_of(info, table.unit)
+            if unit == PER_UNIT or unit.endswith(_OF_POWER):
+                whole = bases.power_unit(unit, table.base, info.name)
+                return SignalMap(info.name, 1 / whole, 0.0, PER_UNIT)
         return SignalMap(info.name, 1.0, 0.0, "1" if plain else unit_of(info, table.unit))
 
     def _switch(self, table: SignalTable) -> SignalMap:

@@ -37,6 +37,7 @@ _START_NAMES = {
 }
 
 
+_NO_UNIT = ("", "-", "1", "pu", "p.u.")  # units that leave open what is meant
 _RATED_VOLTAGE = re.compile(r"^[vu]_?(n|nom|rated|base)$|rated_?volt|nominal_?volt", re.IGNORECASE)
 
 
@@ -164,6 +165,8 @@ def _last(name: str) -> str:
 def _start(fmu: FmuDescription, name: str, taken: Sequence[str]) -> VariableInfo | None:
     pattern = re.compile(_START_NAMES[name], re.IGNORECASE)
     known = [v for v in fmu.variables.values() if v.type == "Real" and v.name not in taken]
+    if name == "S_n":
+        known = [v for v in known if v.unit in _NO_UNIT or v.unit.endswith(("VA", "W"))]
     for causality in ("parameter", "input"):
         exact = [v for v in known if v.causality == causality and v.name == name]
         close = [v for v in known if v.causality == causality and pattern.search(_last(v.name))]

@@ -51,7 +51,8 @@ def look_at_page(folder: Path, content: dict[str, Any], data: xr.Dataset) -> Pag
         return PageSeen(
             unproved=f"{HTML}: {_VIEW}: made on another machine, and digits differ from what comes out here"
         )
-    place = next(k for k, pair in enumerate(zip(there, again, strict=False)) if pair[0] != pair[1])
+    apart = (k for k, pair in enumerate(zip(there, again, strict=False)) if pair[0] != pair[1])
+    place = next(apart, min(len(there), len(again)))
     shown = " ".join(there[max(place - 20, 0) : place + 40].split())
     return PageSeen(f"{HTML}: it is not the page that comes out of {JSON}; first at {shown!r}")
 

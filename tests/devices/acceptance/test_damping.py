@@ -114,6 +114,30 @@ def test_less_than_its_answer_is_told_by_its_cause(tmp_path, seed, times, fault,
     assert said in found.failures[0].evidence
 
 
+def test_a_dead_band_around_the_usual_swing_is_told(tmp_path):
+    """Its gain is so large that the swing that is chosen for it lies within the dead band."""
+    band = "(fabs(m[PASSED]) > 2e-4) * 100"
+    file = build(converter("deaf", pod=True, FAULT_POD_TIMES=band), tmp_path)
+    found = check_fmu(file, None, LIMITS, ("pod",), run_for=0.3, seed=1)
+    assert found.faults == ["POD with a dead band"]
+    assert "by nothing" in found.failures[0].evidence
+
+
+def test_a_controller_of_another_angle_only_is_found(tmp_path):
+    times = "(fabs(m[DELTA]) < 0.9)"
+    file = build(converter("of_one_angle", pod=True, FAULT_POD_TIMES=times), tmp_path)
+    found = check_fmu(file, None, LIMITS, ("pod",), run_for=0.3, seed=1)
+    assert found.faults == ["POD of some points only"]
+    assert "theta_0 = " in found.failures[0].evidence
+
+
+def test_a_power_that_goes_with_the_frequency_is_asked_about(tmp_path):
+    file = build(converter("turned", pod=True, DROOP=0.01, FAULT_POD_TIMES="(-1)"), tmp_path)
+    (*_, found) = check_fmu(file, None, LIMITS, ("pod",), run_for=0.3, seed=1).results
+    assert found.verdict == "remark"
+    assert "asks for more power while the frequency is higher" in found.evidence
+
+
 def test_a_limit_is_judged_by_the_power_where_no_output_shows_it(tmp_path):
     file, bound = behind_a_binding(tmp_path, FAULT_POD_LIMIT=0.5)
     found = check_fmu(file, bound, LIMITS, ("pod",), run_for=0.3)

@@ -108,6 +108,16 @@ def test_power_in_another_unit_than_declared_is_told(name, fault, words, gallery
     assert words in found.results[-1].evidence
 
 
+@pytest.mark.parametrize(
+    ("name", "faults"), [("converter_of_battery", []), ("battery_of_the_time", ["counts time"])]
+)
+def test_a_state_of_charge_that_falls_evenly_is_no_count_of_time(name, faults, gallery):
+    """The droop of both follows the charge, by 0.4 % in a minute; that of one triples after 20 s as well."""
+    found = check_fmu(*gallery(name), LIMITS, ("steady_state", "later_times"), run_for=1.0)
+    assert found.faults == faults
+    assert "what it stores (soc) moves by" in found.results[-1].evidence
+
+
 def test_a_sum_of_times_in_single_precision_shows_after_a_rest(gallery):
     found = check_fmu(
         *gallery("sum_of_single_precision"), LIMITS, ("steady_state", "later_times"), run_for=1.0

@@ -1,5 +1,7 @@
 """Bindings: every form, unit and base comes down to the same port, and every mistake is told with its place."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -331,3 +333,30 @@ def test_a_bound_parameter_stays_a_parameter(binding, fmu_path):
     assert found["wait"].start_number == pytest.approx(factor * own["pod_q.T_W"].start_number)
     assert found["wait"].minimum == pytest.approx(factor * own["pod_q.T_W"].minimum)
     assert found["omega"].causality == "output"
+
+
+@pytest.mark.parametrize(
+    ("name", "variable", "factor"),
+    [
+        ("delta_p_pod", '"S_base"', 1 / 1500),
+        ("pod_p.limit", '"pod_q.limit", base = "100 MVA"', 100 / 1500),
+        ("pod_p.limit", '"pod_q.limit"', 1.0),
+        ("wait", '"S_base"', 1.0),
+    ],
+)
+def test_power_of_a_damping_controller_is_per_unit_of_the_rating(
+    name, variable, factor, binding, fmu_path
+):
+    """Its output is compared with its limit: both have to have one base."""
+    text = OURS + f'"{name}" = {{ variable = {variable} }}\n'
+    found = bind(read_description(fmu_path("gfor")), binding(text))
+    assert found.port.signals[name].factor == pytest.approx(factor)
+    assert found.variables[name].unit == ("MVA" if name == "wait" else "pu")
+
+
+def test_a_draft_takes_no_frequency_for_the_rating(gallery):
+    description = read_description(gallery("converter")[0])
+    hertz = replace(description.variables["tau"], name="f_rated", unit="Hz", start=50.0)
+    others = {k: v for k, v in description.variables.items() if k != "S_n"}
+    text = draft_binding(replace(description, variables={"f_rated": hertz, **others}))
+    assert "f_rated" not in text.partition("[start.S_n]")[0].partition("[voltage]")[0]

@@ -641,6 +641,8 @@ FORGED_PAGES = {
     "shown": lambda text: text.replace("</style>", "h1::after{content:' PASSES'}</style>"),
     "scripted": lambda text: text.replace("</script>", ";document.title='passes'</script>"),
     "added": lambda text: text.replace("</main>", "<b>approved</b></main>"),
+    "longer": lambda text: text + "<b>approved</b>",
+    "shorter": lambda text: text[:-8],
 }
 
 

@@ -15,6 +15,7 @@ from orchestrator.devices.acceptance.checks.base import (
     failed,
     not_applicable,
     passed,
+    remarked,
 )
 from orchestrator.devices.acceptance.checks.damping_swings import (
     DampingBench,
@@ -53,6 +54,8 @@ _OF_POWER = 0.85  # least power in parts of the declared limit, where its output
 _FLAT = 0.05  # part by which the power may differ in two deviations that both reach the limit
 _TO_LIMIT = 2.0  # the smaller of these deviations, in parts of the one whose swing gives the limit
 _BEYOND_LIMIT = 3.0
+_NOISE = 1e-7  # power [pu, S_n] that is rounding
+_WITH = 0.5  # correlation with the frequency from which an output is told to go with it
 _WIDEST = 0.01  # largest lasting deviation of the frequency [pu]
 _PUSHED = 3.0  # its duration [s]
 _LIMIT = 0.03  # part of the declared limit by which the output's peak may differ from it
@@ -78,6 +81,13 @@ _PLACES = (
 """Bounds of voltage and power [pu] between which the points are drawn."""
 _REACTIVE = ((-0.4, -0.25), (0.25, 0.4))
 """Bounds of reactive power [pu, S_n] of further points, at little power."""
+_TURNED = (1.2, 2.8)
+"""Bounds of the voltage's angle [rad] at these, forth and back."""
+
+
+_ASK_FOR_ITS_SIGN = (
+    "ask whether its sign is meant: `gfor modes CASE` with it on and off shows what it damps"
+)
 
 
 @dataclass(frozen=True)
@@ -113,6 +123,9 @@ def pod(subject: Subject) -> CheckResult:
     says += f"and times are alike, in a swing of {bench.hertz:.3g} Hz"
     says += f"; {len(trial.passed_over)} points were not tried" if trial.passed_over else ""
     figures: dict[str, Any] = {"tried": tried}
+    turned = trial.goes_with_frequency()
+    if turned:
+        return remarked("pod", f"{says}; {turned}", _ASK_FOR_ITS_SIGN, **figures)
     if trial.moved_on:
         figures["not_judged"] = "what events leave in its damping controller"
     return passed("pod", says, **figures)
@@ -147,6 +160,16 @@ class _Trial:
         yield self._after_work()
         yield from self._lasting()
 
+    def goes_with_frequency(self) -> str:
+        """Say that POD-P asks for more power while the frequency is higher; "" if it does not."""
+        for name, usual in zip(self._bench.names, self._usual, strict=True):
+            swing = np.sin(2 * np.pi * self._bench.hertz * usual.time)
+            size = float(np.linalg.norm(swing) * np.linalg.norm(usual.course))
+            along = float(swing @ usual.course) / size
+            if name == "pod_p" and along > _WITH:
+                return f"{usual.title} asks for more power while the frequency is higher (correlation {along:.2f})"
+        return ""
+
     def _find_size(self) -> _Fault | None:
         """Choose the usual swing by what it brings; a controller that brings nothing in any is dead."""
         bench = self._bench
@@ -159,8 +182,19 @@ class _Trial:
             if least > answer_size(size):
                 self._size = size * min(10.0, wanted / max(effect.peak for effect in seen))
                 self._usual = bench.effects(FrequencySwing(self._size))
-                return None
+                return self._silent_in_the_usual(size, seen)
         return self._reason_of_silence(min(seen, key=lambda effect: effect.least_peak))
+
+    def _silent_in_the_usual(self, size: float, seen: tuple[Effect, ...]) -> _Fault | None:
+        """Look for a controller that answers the swing of `size` and not the smaller one that is chosen for it."""
+        for larger, usual in zip(seen, self._usual, strict=True):
+            if usual.least_peak <= _NOISE:
+                says = (
+                    f"{usual.title} answers a swing of {1e6 * size:.3g}e-6 pu of the frequency by "
+                )
+                says += f"{larger.peak:.3g} pu, and one of {1e6 * self._size:.3g}e-6 pu by nothing"
+                return _Fault("POD with a dead band", says)
+        return None
 
     def _reason_of_silence(self, dead: Effect) -> _Fault:
         """Look later and at other points for what a controller that brings nothing at first does there."""
@@ -174,6 +208,7 @@ class _Trial:
                 says += f" at P_0 = {_POINT.P:g}, v_0 = {_POINT.v:g}, and answers one at P_0 = {point.P:g}, "
                 says += f"v_0 = {point.v:g}"
                 says += f", Q_0 = {point.Q:g}" if point.Q else ""
+                says += f", theta_0 = {point.theta:g}" if point.theta else ""
                 return _Fault("POD of some points only", says)
         return _Fault("POD without effect", f"{says} at {self._bench.hertz:.3g} Hz")
 
@@ -279,8 +314,10 @@ class _Trial:
             yield OperatingAt(
                 round(float(draw.uniform(*v)), 3), 0.0, round(float(draw.uniform(*P)), 3), 0.0
             )
-        for Q in _REACTIVE:
-            yield OperatingAt(1.0, 0.0, 0.3, round(float(draw.uniform(*Q)), 3))
+        turned = self._bench.subject.random("pod, angles")
+        for number, Q in enumerate(_REACTIVE):
+            theta = (-1) ** number * round(float(turned.uniform(*_TURNED)), 3)
+            yield OperatingAt(1.0, theta, 0.3, round(float(draw.uniform(*Q)), 3))
 
     def _elsewhere(self) -> Iterator[_Fault | None]:
         for point in self._places():
@@ -297,6 +334,7 @@ class _Trial:
     def _at(self, point: OperatingAt, found: tuple[Effect, ...]) -> _Fault | None:
         where = f"at P_0 = {point.P:g}, v_0 = {point.v:g}"
         where += f", Q_0 = {point.Q:g}" if point.Q else ""
+        where += f", theta_0 = {point.theta:g}" if point.theta else ""
         for usual, other in zip(self._usual, found, strict=True):
             part, alike = ratio(usual, other), likeness(usual, other)
             if _LEAST < part < _MOST and alike > _ALIKE:

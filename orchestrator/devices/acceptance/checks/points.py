@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from orchestrator.core.arrays import Numbers
+from orchestrator.core.arrays import Flags, Numbers
 from orchestrator.core.errors import ComponentError, EndedError
 from orchestrator.core.units import to_unit
 from orchestrator.devices.acceptance.checks import port
@@ -221,6 +221,9 @@ def _answer(subject: Subject, rating: float) -> complex:
 _LATE = 20_000.0
 
 _SAME = 1e-4  # part of their range by which two answers may differ
+_EVENLY = 0.05  # part by which a store's motion at rest may differ from the rate of its first step
+_FILLED = 0.1  # most by which an answer may follow what is stored, in parts of itself
+_PORT = ("i_re", "i_im", "p", "q", "omega")  # outputs that have to rest
 _STILL = 100.0  # the same, in parts of the motion of a device at rest
 
 # part of an output's size by which an angle of six million radians, short of digits, changes it
@@ -246,8 +249,15 @@ def later_times(subject: Subject) -> CheckResult:
     if rested is not None:
         point, rest, late = rested
         first = subject.trajectory(steps, h, subject.one_step(), point=point)
-        found = _differs(first, late, _STILL * rest.moved)
-        said.append(f"after {rest.time:.3g} s at rest it is {found:.2g} of its range away")
+        stores = _find_stores(subject, first, late, rest.time)
+        filled = float(np.abs(late[0, stores] / first[0, stores] - 1).max(initial=0.0))
+        level = np.where(stores, late[0] - first[0], 0.0)
+        apart = _differs(first, late - level, _STILL * rest.moved)
+        said.append(f"after {rest.time:.3g} s at rest it is {apart:.2g} of its range away")
+        if stores.any():
+            names = ", ".join(str(name) for name in np.array(subject.outputs)[stores])
+            said.append(f"where what it stores ({names}) moves by {100 * filled:.2g} %")
+        found = apart if apart > min(filled, _FILLED) else 0.0
     first = subject.trajectory(steps, h, subject.one_step())
     try:
         subject.start_time = _LATE
@@ -268,6 +278,19 @@ def later_times(subject: Subject) -> CheckResult:
         if found > _SAME
         else passed("later_times", says, apart=found)
     )
+
+
+def _find_stores(subject: Subject, first: Numbers, late: Numbers, seconds: float) -> Flags:
+    """Find outputs that moved at rest all the time as fast as they begin to move, such as a battery's state of charge.
+
+    ``first``, ``late``: outputs at the communication points of the answer, at once and after a rest.
+    ``seconds``: duration of the rest [s]."""
+    moved = late[0] - first[0]
+    at_its_rate = (first[1] - first[0]) / subject.step_size * seconds
+    even = (np.abs(moved - at_its_rate) < _EVENLY * np.abs(moved)) & (first[0] != 0.0)
+    own = np.array([name not in _PORT for name in subject.outputs])
+    found: Flags = even & own
+    return found
 
 
 def _differs(first: Numbers, late: Numbers, least: Numbers | float) -> float:

@@ -3,7 +3,7 @@
    z: parameters, inputs, outputs; memory: the states. */
 enum { S_N, P_0, Q_0, V_0, THETA_0, GAIN, TAU, IN_1, IN_2, IN_3, OUT_1, OUT_2, OUT_3, OMEGA, SHOWN, POD_K, POD_T_W, POD_T_F, POD_LIMIT, DELTA_P, SIZE };
 enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, TICK, PENDING, ON, QUICK, SLOW, TIRED, DIPS, LOW, WOUND, BLOCKED, ANGLE, RING, RINGING,
-       LAGGED, TRIPLED, VOLT, P_NOW, SINCE, OVER, WASHED, PASSED, K_AT_START, AGE, WORKED, WAS_ON, SWITCHED, MEMORY };
+       LAGGED, TRIPLED, VOLT, P_NOW, SINCE, OVER, WASHED, PASSED, K_AT_START, AGE, WORKED, WAS_ON, SWITCHED, STORED, MEMORY };
 #define SWITCH ON /* a Boolean: damping by the frequency behind a washout; with POD, a damping controller */
 #define IS_OUTPUT(r) (((r) >= OUT_1 && (r) <= SHOWN) || (r) == DELTA_P)
 #define DIVERGED 1e12
@@ -166,6 +166,7 @@ static void initialise(double *z, double *m) {
 #endif
     m[ANGLE] = t;
     m[WASHED] = m[PASSED] = m[AGE] = m[WORKED] = m[SWITCHED] = 0, m[WAS_ON] = m[ON], m[K_AT_START] = z[POD_K];
+    m[STORED] = 0.5;
     m[TRIPLED] = m[OVER] = 0, m[SINCE] = 1e9, m[VOLT] = v, m[P_NOW] = m[P_F];
 #ifdef METER_BEGINS
     m[LAGGED] = METER_BEGINS - 1.0;
@@ -216,6 +217,9 @@ static double slip(const double *z, const double *m, double p_f) {
     wanted -= 0.5 * m[PENDING];
 #endif
     double gain = z[GAIN];
+#ifdef STORE
+    gain *= 1 + 0.5 * (m[STORED] - 0.5); /* less of a droop with less in it */
+#endif
 #ifdef FAULT_GAIN_OF_DIPS
     gain *= pow(FAULT_GAIN_OF_DIPS, m[DIPS]);
 #endif
@@ -387,6 +391,9 @@ static void substep(const double *z, double *m, double *hidden, phasor v, double
     m[WORKED] += h * (fabs(damping_power(z, m)) > 0.6 * z[POD_LIMIT]);
     m[SWITCHED] += m[WAS_ON] != m[ON], m[WAS_ON] = m[ON];
 #endif
+#ifdef STORE /* a battery of so many hours at S_n: its state of charge */
+    m[STORED] -= h / 3600 / STORE * m[P_NOW];
+#endif
     m[QUICK] += h / 0.02 * (slip(z, m, m[P_F]) - m[QUICK]);
     m[SLOW] += h / 5.0 * (m[QUICK] - m[SLOW]);
 #ifdef FAULT_TURNS_BELOW
@@ -539,6 +546,9 @@ static void outputs(double *z, double *m, const double *hidden) {
 #ifdef FAULT_SHOWS_SIZE
     z[SHOWN] = fabs(z[SHOWN]);
 #endif
+#endif
+#ifdef STORE
+    z[SHOWN] = m[STORED];
 #endif
 #ifdef POD
     z[DELTA_P] = damping_power(z, m);

@@ -331,6 +331,10 @@ def good():
             )
             for unit, shown in (("MW", "(0.98 * z[S_N])"), ("kW", "(1000 * z[S_N])"), ("pu", "1.0"))
         ],
+        Member(
+            converter("converter_of_battery", shown=("soc", "1"), STORE=1.0),
+            only=("steady_state", "later_times"),
+        ),
         *carriers(
             "converter_stiff",
             X_PU=0.12,
@@ -681,6 +685,13 @@ def large_signals():
             "steady_state",
             "later_times",
             FAULT_TRIPLES_AFTER=20.0,
+        ),
+        Member(
+            converter(
+                "battery_of_the_time", shown=("soc", "1"), STORE=1.0, FAULT_TRIPLES_AFTER=20.0
+            ),
+            "counts time",
+            only=("steady_state", "later_times"),
         ),
         *[
             Member(
