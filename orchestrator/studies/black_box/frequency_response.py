@@ -191,7 +191,8 @@ def _by_multisine(
     raise AnalysisError(
         f"{bench.description.path.name}: after {len(found) * seconds:g} s of a periodic {bench.inputs[column]} its "
         f"response still changes by {change.max() / np.abs(found[-1]).max():.2g} over {apart * seconds:g} s; it is "
-        "unstable at an ideal bus, or slower than that: try --method pulse, or a smaller amplitude"
+        "unstable at an ideal bus, or slower than that, or follows what it stores, such as a battery's charge: "
+        "try `gfor fmu admittance --method pulse`, or a smaller amplitude"
     )
 
 

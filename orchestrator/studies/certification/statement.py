@@ -85,9 +85,13 @@ def differences_of(signed: Mapping[str, Any], folder: Path, content: Content) ->
     if signed == here:
         return []
     of_signed, of_here = _subjects(signed), _subjects(here)
-    if of_signed.get(FMU) != of_here[FMU]:
+    if FMU not in of_signed:
         return [
-            f"it is the signature of another certificate: of an FMU with the SHA-256 {of_signed.get(FMU)}, and that "
+            f"it is no signature of a certificate: it is one of {', '.join(of_signed) or 'nothing'}"
+        ]
+    if of_signed[FMU] != of_here[FMU]:
+        return [
+            f"it is the signature of another certificate: of an FMU with the SHA-256 {of_signed[FMU]}, and that "
             f"of {FMU} is {of_here[FMU]}"
         ]
     names = [name for name in {**of_here, **of_signed} if of_signed.get(name) != of_here.get(name)]

@@ -38,6 +38,21 @@ def answer(point, fall, slower, slope=SLOPE, inside=False):
     return DroopAnswer(i - i_0, power, power, 0.0, abs(power), ())
 
 
+def lagging(point):
+    """The settled answer of a phasor model to less frequency."""
+    i_0 = complex(point.P, -point.Q)
+    e_0 = abs(1 + complex(R, X) * i_0)
+    active = point.P + EFFECT
+
+    def away(q):
+        e = 1 + complex(R, X) * (1 - 1j * LAG * FREQUENCY) * complex(active, -q)
+        return abs(e) - e_0 + SLOPE * (q - point.Q)
+
+    i = complex(active, -brentq(away, point.Q - 1.0, point.Q + 1.0))
+    power = i.conjugate() - i_0.conjugate()
+    return DroopAnswer(i - i_0, power, power, 0.0, abs(power), ())
+
+
 @pytest.mark.parametrize("slope", [0.06, -0.06])
 @pytest.mark.parametrize("inside", [False, True])
 def test_the_slope_of_the_law_comes_out(slope, inside):
@@ -47,6 +62,18 @@ def test_the_slope_of_the_law_comes_out(slope, inside):
         for p in points
     ]
     assert law.droop(found) == pytest.approx(slope, abs=1e-5)
+
+
+LAG = 1.2
+"""Angle [rad] by which a phasor model's current lags with 1 pu of frequency: 4 ms."""
+
+
+def test_a_phasor_model_whose_current_lags_has_no_droop_of_the_wrong_sign():
+    """Its reactance does not follow the frequency, and its current lags: both look like a voltage that rises."""
+    points = [law.OperatingAt(1.0, 0.0, P, Q) for P, Q in ((0.7, 0.1), (0.2, 0.02), (-0.5, 0.1))]
+    found = [(p, answer(p, VOLTAGE, 0.0), lagging(p)) for p in points]
+    assert law.droop(found) is None or law.droop(found) > 0
+    assert np.abs(law._errors(np.array([R, X, SLOPE, LAG]), found, False)).max() < 1e-9
 
 
 def test_the_reactance_falls_with_the_frequency():

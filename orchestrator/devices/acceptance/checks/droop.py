@@ -30,6 +30,7 @@ _FURTHER_ABSORBING = (
 )
 
 SETTLED = 1e-3  # power [pu, S_n] by which an answer may still move
+_BETTER = 0.8  # error of a phasor model, in parts of the law's, up to which it explains the answers as well
 _GOOD = 0.2  # largest error of the law, in parts of what the droop does where the frequency changes
 
 
@@ -87,7 +88,24 @@ def droop(found: Sequence[tuple[OperatingAt, DroopAnswer, DroopAnswer]]) -> floa
     moved = min(abs(frequency.power.imag) for _, _, frequency in found[:1])
     if reactance < 0.02 or abs(resistance) > reactance or error > _GOOD * abs(slope) * moved:
         return None
-    return slope
+    return None if slope < 0 and _rises_by_its_lag(found, error) else slope
+
+
+def _rises_by_its_lag(
+    found: Sequence[tuple[OperatingAt, DroopAnswer, DroopAnswer]], error: float
+) -> bool:
+    """Return whether a phasor model, whose current lags and whose reactance is fixed, explains the answers as well.
+
+    ``error``: what the law leaves of the answers [pu]."""
+    from scipy.optimize import least_squares  # noqa: PLC0415 - half a second to import
+
+    for inside in (False, True):
+        best = least_squares(
+            _errors, (0.02, 0.2, 0.0, 0.0), args=(found, inside), x_scale=(0.01, 0.1, 0.05, 1.0)
+        )
+        if best.x[2] > 0 and float(np.abs(best.fun).max()) < _BETTER * error:
+            return True
+    return False
 
 
 def _errors(
@@ -95,8 +113,11 @@ def _errors(
     found: Sequence[tuple[OperatingAt, DroopAnswer, DroopAnswer]],
     inside: bool,
 ) -> NDArray[np.float64]:
-    """ΔE + n·ΔQ for every answer."""
-    resistance, reactance, slope = x
+    """ΔE + n·ΔQ for every answer.
+
+    ``x``: resistance, reactance, droop n [pu]; where a phasor model is meant, also the angle [rad] by which its current
+    lags with 1 pu of frequency, and then its reactance is that of rated frequency."""
+    resistance, reactance, slope = x[:3]
     errors = []
     for point, *answers in found:
         i_0 = complex(point.P, -point.Q) / point.v
@@ -104,6 +125,8 @@ def _errors(
         for answer, fall, slower in zip(answers, (VOLTAGE, 0.0), (0.0, FREQUENCY), strict=True):
             v, i = point.v * (1 - fall), i_0 + answer.i
             e = v + (resistance + 1j * reactance * (1 - slower)) * i
+            if len(x) == 4:
+                e = v + (resistance + 1j * reactance) * (1 - 1j * x[3] * slower) * i
             q_0, q = (
                 ((e_0 if inside else point.v) * i_0.conjugate()).imag,
                 ((e if inside else v) * i.conjugate()).imag,
