@@ -6,8 +6,9 @@ from importlib.metadata import version
 from typing import Any, ParamSpec, TypeVar
 
 from mcp.server import MCPServer
+from mcp.server.mcpserver import Context
 from mcp.server.mcpserver.exceptions import ToolError
-from mcp.types import ToolAnnotations
+from mcp.types import CallToolResult, InputRequiredResult, Tool, ToolAnnotations
 
 from orchestrator.core.errors import CosimError
 from orchestrator.face.agents.question import Allowance
@@ -23,6 +24,8 @@ VERBS = (
     "sensitivities",
     "explain",
 )
+
+_SHOWN = 40  # characters of an unknown argument's name that an error repeats
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -42,7 +45,7 @@ def make_server(allowance: Allowance) -> MCPServer[Any]:
     allowance
         Folders that may be read, the folder of results, and how long a question may take.
     """
-    server: MCPServer[Any] = MCPServer(
+    server = VerbServer(
         "gfor-cosim", instructions=_INSTRUCTIONS, version=version("gfor-cosim"), log_level="WARNING"
     )
     verbs = Verbs(allowance)
@@ -52,6 +55,37 @@ def make_server(allowance: Allowance) -> MCPServer[Any]:
             _with_errors(getattr(verbs, name))
         )
     return server
+
+
+class VerbServer(MCPServer[Any]):
+    """A server that refuses an argument which a verb has not, instead of an answer as if it were not given."""
+
+    async def list_tools(self) -> list[Tool]:
+        """List the verbs; the schemas of their arguments are closed."""
+        tools = await super().list_tools()
+        for tool in tools:
+            tool.input_schema["additionalProperties"] = False
+        return tools
+
+    async def call_tool(
+        self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None = None
+    ) -> CallToolResult | InputRequiredResult:
+        """Answer a question whose arguments the verb has."""
+        schemas = {tool.name: tool.input_schema for tool in await super().list_tools()}
+        if name in schemas:
+            _check_names(name, arguments, schemas[name])
+        return await super().call_tool(name, arguments, context)
+
+
+def _check_names(verb: str, given: dict[str, Any], schema: dict[str, Any]) -> None:
+    has, needs = list(schema.get("properties", {})), schema.get("required", ())
+    unknown, missing = [n for n in given if n not in has], [n for n in needs if n not in given]
+    if unknown:
+        raise ToolError(
+            f"{verb}: there is no argument {unknown[0][:_SHOWN]!r}; it takes: {', '.join(has) or 'none'}"
+        )
+    if missing:
+        raise ToolError(f"{verb}: give {missing[0]!r}; it takes: {', '.join(has)}")
 
 
 def _with_errors(verb: Callable[_P, _R]) -> Callable[_P, _R]:

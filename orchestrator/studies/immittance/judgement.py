@@ -227,8 +227,9 @@ def _ends(loop: CutLoop, path: LoopPath) -> list[str]:
     reasons = []
     first = _principal(path, 0) - path.lead
     if abs(first - np.pi * round(first / np.pi)) > _BEGIN or path.hertz[0] > _RANGE[0]:
+        lower = min(_RANGE[0], float(path.hertz[0]) / 2)
         reasons.append(
-            f"at {path.hertz[0]:g} Hz the loop is not yet where it begins: scan lower ones, from {_RANGE[0]:g} Hz"
+            f"at {path.hertz[0]:g} Hz the loop is not yet where it begins: scan lower ones, from {lower:.2g} Hz"
         )
     if loop.is_exact:
         last, half = _principal(path, -1), int(np.argmax(path.hertz >= path.hertz[-1] / 2))

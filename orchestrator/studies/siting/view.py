@@ -25,7 +25,7 @@ from orchestrator.output.results.storage import save_json, save_table
 from orchestrator.studies.points.code import code_hash
 from orchestrator.studies.siting.confirmation import Confirmation
 from orchestrator.studies.siting.placing import ACTIVE, OURS_MVA, REACTIVE
-from orchestrator.studies.siting.residues import SeenMode
+from orchestrator.studies.siting.residues import SeenMode, Situation
 from orchestrator.studies.siting.study import DEVICE, DROOP, SiteResult, SupportShift
 
 TITLES = {"pod_p": "POD-P", "pod_q": "POD-Q", DROOP: "a droop"}
@@ -178,13 +178,21 @@ def _called(seen: SeenMode) -> str:
 def sureness(result: SiteResult) -> list[str]:
     before = result.intact.modes[0].mode.damping_percent
     bad = [
-        f"{at.name} ({_called(at.modes[0])})"
+        f"{at.name} ({_growing(at)})"
         for at in result.worst_first
         if at.found.stability.stable is False
     ]
     said = [f"UNSTABLE without the device: {few(bad, _NAMED)}"] if bad else []
     found = [_confirmed(result, one, before) for one in result.confirmations]
     return [*said, *(found or ["not confirmed by coupled FMUs"])]
+
+
+def _growing(at: Situation) -> str:
+    """Name the mode that grows there, or what grows beside the modes of the range, which are all damped."""
+    least = at.modes[0]
+    if least.mode.damping_percent < 0:
+        return _called(least)
+    return f"{at.found.stability.because()}; least damped in the range: {_called(least)}"
 
 
 def _confirmed(result: SiteResult, one: Confirmation, before: float) -> str:

@@ -49,6 +49,8 @@ def answers(tmp_path_factory):
         ("modes", {"case": "kundur", "scenario": "manual"}),
         ("modes", {"case": "../secret.toml"}),
         ("explain", {"case": "kundur", "scenario": "--out=x"}),
+        ("modes", {"case": "two_area", "set": {"gfor.pod_p.K": 0}}),
+        ("explain", {"case": "two_area"}),
     )
 
 
@@ -84,10 +86,21 @@ def test_each_mode_of_kundurs_system_has_its_own_shape_and_participations(answer
 
 
 def test_hostile_arguments_are_refused_in_words(answers):
-    folder, (_, (_, _, outside, option)) = answers
+    folder, (_, (_, _, outside, option, *_)) = answers
     assert outside.is_error
     assert "no such file in the folders that may be read" in outside.content[0].text
     assert "secret" not in outside.content[0].text.replace("../secret.toml", "")
     assert option.is_error
     assert "does not begin with '-'" in option.content[0].text
     assert not (folder / "x").exists()
+
+
+def test_an_argument_that_a_verb_has_not_is_refused_and_never_dropped(answers):
+    _, (tools, (*_, unknown, missing)) = answers
+    assert unknown.is_error
+    assert "modes: there is no argument 'set'; it takes: case, scenario, values" in (
+        unknown.content[0].text
+    )
+    assert missing.is_error
+    assert "explain: give 'scenario'" in missing.content[0].text
+    assert all(tool.input_schema["additionalProperties"] is False for tool in tools)

@@ -365,6 +365,20 @@ def test_a_saved_page_moves_without_a_server(browser, tmp_path, capsys):
         assert [row[:2] for row in rows(view)] == shown(content["modes"])
         assert view.locator("#run").is_disabled()
         halfway_between_two(view, slider)
+        where_nothing_is_known_between(view, slider)
+
+
+def where_nothing_is_known_between(view, slider):
+    """The figures are those of the nearest computed value, which the verdict names, and not of the slider's place."""
+    view.evaluate("SAVED.cells = []")
+    for place in (40, 60):
+        slider.evaluate(
+            "(one, x) => { one.value = x; one.dispatchEvent(new Event('input')); }", place
+        )
+    view.get_by_text("nearest computed value to").wait_for()
+    said = view.locator("#verdict").inner_text()
+    assert said.count("nearest computed value to") == 1
+    assert "with gfor.pod_p.K = 100: stable" in said
 
 
 def halfway_between_two(view, slider):

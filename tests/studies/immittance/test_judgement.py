@@ -153,6 +153,7 @@ def test_a_scan_that_begins_above_the_begin_of_the_loop_is_seen():
     cut_short = judged(plant, line, np.geomspace(1.0, 1000, 400))
     assert len(cut_short.reasons) == 1
     assert "at 1 Hz the loop is not yet where it begins" in cut_short.reasons[0]
+    assert "scan lower ones, from 0.5 Hz" in cut_short.reasons[0]
     late = judged(
         constant_power(g=1.2, h=0.6, T=0.003, G=0.2), STRONG, np.geomspace(2.2, 1000, 300)
     )

@@ -132,6 +132,15 @@ def test_what_is_unstable_without_the_device_is_named_first():
     )
 
 
+def test_what_grows_beside_damped_modes_of_the_range_is_named():
+    asked = SiteRequest("pod_p", scenario="manual", confirm=0)
+    found = find_sites(load_case("kundur"), asked)
+    assert sureness(found)[0].startswith(
+        "UNSTABLE without the device: intact (a mode grows at +0.005153 1/s (no oscillation; "
+    )
+    assert "; least damped in the range: inter-area, 0.542 Hz, 3.27 %)" in sureness(found)[0]
+
+
 def test_the_json_has_a_shift_for_each_bus_and_mode(gfor, tmp_path):
     code, out, _ = gfor(
         "site",

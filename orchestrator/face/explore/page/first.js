@@ -29,7 +29,7 @@ async function firstResponse(key) {
 }
 function paintFirstPlot() {
   const name = Object.keys(seen.firstCurves ?? {})[0], moved = SAVED && Object.keys(state.values).some(one => state.values[one] !== (SAVED.beginning.values[one] ?? original(one)));
-  $("first-event").textContent = `${eventsNow().map(wordsOf).join("; ") || "the scenario has no event"}${moved ? " (at the case's own values)" : ""}`;
+  $("first-event").textContent = !seen.info ? "" : `${eventsNow().map(wordsOf).join("; ") || "the scenario has no event"}${moved ? " (at the case's own values)" : ""}`;
   if (name) { $("first-plot").replaceChildren(chartOf(name, [{ data: seen.firstCurves[name], look: " linear", text: "linear model", colour: "#d55e00" }], span, paintFirstPlot)); return; }
   const run = make("button", {}, "Run the co-simulation");
   run.addEventListener("click", () => { openTab("response"); coSimulation(); });
@@ -91,21 +91,20 @@ function keepOneMoved(snapped) {
 
 // -- questions ------------------------------------------------------------------------------------------------------
 
-// Lines without which the network hangs together, that with the largest flow first; the one that was clicked before them.
-function linesToLose() {
+// A line without which the network hangs together: the one that was clicked, else that with the largest flow.
+function lineToLose() {
   const d = seen.info?.diagram, flows = Object.fromEntries((flowOf()?.branches ?? []).map(b => [b.name, Math.abs(b.p_from_mw)]));
-  if (!d) return [];
+  if (!d) return null;
+  const beside = {}, add = (from, to, line) => (beside[from] ??= []).push([to, line]);
+  for (const l of d.lines) if (isOn(l.open)) { add(l.from, l.to, l); add(l.to, l.from, l); }
   const whole = lost => {
     const reached = new Set([d.buses[0].name]), todo = [d.buses[0].name];
-    while (todo.length) {
-      const at = todo.pop();
-      for (const l of d.lines) if (l !== lost && isOn(l.open)) for (const [a, b] of [[l.from, l.to], [l.to, l.from]]) if (a === at && !reached.has(b)) { reached.add(b); todo.push(b); }
-    }
+    while (todo.length) for (const [to, line] of beside[todo.pop()] ?? []) if (line !== lost && !reached.has(to)) { reached.add(to); todo.push(to); }
     return reached.size === d.buses.length;
   };
   const clicked = l => element?.kind === "line" && element.name === l.name;
   const closed = d.lines.filter(l => l.open && isOn(l.open)).sort((a, b) => clicked(b) - clicked(a) || (flows[b.name] ?? 0) - (flows[a.name] ?? 0));
-  return closed.slice(0, 40).filter(whole);
+  return closed.slice(0, 40).find(whole) ?? null;
 }
 const swingOf = answer => { const one = answer.modes.scenarios[0], least = leastOf(one.modes); return `${one.stable === true ? "stable" : one.stable === false ? "UNSTABLE" : "not known"}${least ? `, least damped ${fixed(least.frequency_hz, 3)} Hz with ${fixed(least.damping_percent, 2)} %` : ""}`; };
 function sayElse(...parts) { $("else-said").replaceChildren(make("p", {}, ...parts)); }
@@ -127,7 +126,8 @@ async function searchWith(name, percent) {
   sayElse(`${name} is tried ${percent === null ? "until the system is unstable" : `until the least damped mode has ${percent} %`} …`);
   const show = await one.search(percent, false), button = make("button", {}, "show it");
   button.addEventListener("click", () => show());
-  sayElse(`${name}: ${one.said.innerText.replaceAll("\nalso ", "; also ").replaceAll(" set", "").split("\n")[0]} `, show ? button : "");
+  const now = leastOf(seen.modes), here = now && percent !== null ? `now ${fixed(now.damping_percent, 2)} % at ${number(state.values[name] ?? original(name))}; ` : "";
+  sayElse(`${name}: ${here}${one.said.innerText.replaceAll("\nalso ", "; also ").replaceAll(" set", "").split("\n")[0]} `, show ? button : "");
 }
 async function withoutConverter(other) {
   sayElse(`${seen.titles[other]}: being computed …`);
@@ -141,9 +141,9 @@ function whatAModeIs() {
   sayElse(`A mode is one of the ways in which the system swings by itself after any disturbance, as a bell has its tones: it has a frequency, a damping, and a shape, which tells who swings against whom (the arrows).${own}`);
 }
 function paintQuestions() {
-  const first = seen.moversOf === state.scenario ? seen.movers?.movers[0]?.parameter : null, all = seen.info?.parameters ?? [];
+  const movers = seen.moversOf === state.scenario ? seen.movers?.movers ?? [] : [], first = (movers.find(one => one.parameter.startsWith("grid.")) ?? movers[0])?.parameter, all = seen.info?.parameters ?? [];
   const gains = all.filter(p => /(^|\.)K$/.test(p.parameter) && p.variability === "tunable" && p.value), gain = gains.find(p => p.switches.every(one => (state.values[one] ?? original(one)) !== false)) ?? gains[0];
-  const line = linesToLose()[0], long = seen.info?.diagram?.lines.find(l => l.length && original(l.length));
+  const line = SAVED ? null : lineToLose(), long = seen.info?.diagram?.lines.find(l => l.length && original(l.length));
   const other = Object.keys(seen.titles).find(name => seen.systems?.[name] !== seen.systems?.[state.scenario]), off = gain?.switches[0], questions = [];
   const add = (text, act) => { const button = make("button", {}, text); button.addEventListener("click", act); questions.push(button, " "); };
   if (!SAVED && line) add(`What if line ${line.name} is out?`, () => withValues({ [line.open]: false }, `Without line ${line.name}`));

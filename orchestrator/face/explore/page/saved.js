@@ -34,7 +34,9 @@ async function dragSaved(name, value) {
   }
   const cell = SAVED.cells.find(one => Object.entries(one.at).every(([key, [low, high]]) => key in wanted && low <= wanted[key] && wanted[key] <= high));
   if (!cell || value === heldNear(name, value)) {
-    if (seen.estimate) { seen.estimate = null; paintVerdict(); paintMap(); paintTable(); }
+    if (seen.estimate) { seen.estimate = null; paintMap(); paintTable(); }
+    paintVerdict();
+    if (value !== heldNear(name, value)) $("verdict").textContent = `nearest computed value to ${number(value)}: ${$("verdict").textContent}`;
     return;
   }
   const between = betweenOf(cell, wanted), corner = cell.corners.findIndex(place => SAVED.answers[place].answer === seen.answer);

@@ -189,7 +189,7 @@ function finder({ now, bounds, valuesAt, apply, words }) {
     }
     const far = ({ good: { x } }) => (percent === null && here > 0 ? (x > 0 ? Math.abs(Math.log(x / here)) : Infinity) : Math.abs(x - here));
     crossings.sort((a, b) => far(a) - far(b));
-    const text = ({ good, bad }) => (percent === null ? `stable ${bad.x > good.x ? "up" : "down"} to ${words} ${number(good.x, 6)}, UNSTABLE at ${number(bad.x, 6)}: ${bad.verdict.replace(/^UNSTABLE: /, "")}`
+    const text = ({ good, bad }) => (percent === null ? `stable ${bad.x > good.x ? "up" : "down"} to ${words} ${number(good.x, 6)}, UNSTABLE at ${number(bad.x, 6)}${bad.verdict.includes("cause: the coupling") ? ", by the communication step and not by the system" : ""}: ${bad.verdict.replace(/^UNSTABLE: /, "")}`
       : `${fixed(good.damping, 2)} % at ${words} ${number(good.x, 6)}; ${bad.x > good.x ? "above" : "below"} it is less than ${number(percent)} %${bad.f < -percent ? " (unstable)" : ""}`);
     if (percent !== null && sets) await apply(crossings[0].good.x);
     said.replaceChildren(...crossings.flatMap((one, k) => {
