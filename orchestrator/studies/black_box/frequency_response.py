@@ -59,6 +59,10 @@ def pulse_response(m: Numbers, frequencies: Numbers, step_size: float) -> Comple
 
 
 METHODS = ("multisine", "pulse")
+_DRIFTS = 2e-3  # part of a response by which it may go on changing; its bound is the change of the whole time
+_AT_ONE_RATE = (
+    0.05  # part by which two such changes may differ; what dies away or grows differs more
+)
 _MOST_SECONDS = 400.0  # time after which a response must have settled [s]
 # shortest time between two compared periods [s]: short ones in direct succession look alike
 _APART = 10.0
@@ -188,12 +192,23 @@ def _by_multisine(
                 mean = y.mean(axis=0)
                 _check_returned(bench, column, np.abs(mean).max(), np.abs(y - mean).max())
                 return found[-1], change, len(found) * seconds
+    if _drifts_evenly(found, apart):
+        mean = y.mean(axis=0)
+        _check_returned(bench, column, np.abs(mean).max(), np.abs(y - mean).max())
+        return found[-1], change * len(found) / apart, len(found) * seconds
     raise AnalysisError(
         f"{bench.description.path.name}: after {len(found) * seconds:g} s of a periodic {bench.inputs[column]} its "
         f"response still changes by {change.max() / np.abs(found[-1]).max():.2g} over {apart * seconds:g} s; it is "
         "unstable at an ideal bus, or slower than that, or follows what it stores, such as a battery's charge: "
         "try `gfor fmu admittance --method pulse`, or a smaller amplitude"
     )
+
+
+def _drifts_evenly(found: list[Complex], apart: int) -> bool:
+    """Return whether a response changes little and at one rate, as that of a battery with its charge."""
+    last, before = (found[-1 - k] - found[-1 - k - apart] for k in (0, apart))
+    size, moved = np.abs(found[-1]).max(), np.abs(last).max()
+    return bool(moved <= _DRIFTS * size and np.abs(last - before).max() <= _AT_ONE_RATE * moved)
 
 
 def _by_pulses(

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.studies.black_box.frequency_response import (
+    _drifts_evenly,
     line_response,
     multisine,
     odd_lines,
@@ -63,3 +64,18 @@ def test_both_ways_give_the_exact_response():
     wanted = exact(frequencies)
     assert np.abs(by_lines - wanted).max() < 1e-10
     assert np.abs(by_pulse - wanted).max() < 1e-10
+
+
+@pytest.mark.parametrize(
+    ("course", "even"),
+    [
+        (lambda k: 7e-5 * k, True),
+        (lambda k: 1e-2 * k, False),
+        (lambda k: 0.02 * np.exp(-k / 8), False),
+        (lambda k: 1e-3 * np.exp(k / 5 - 8), False),
+    ],
+)
+def test_only_a_small_change_at_one_rate_is_a_drift(course, even):
+    """The response of a battery follows its charge; what dies away, grows or changes much is not measured."""
+    found = [np.full((3, 2), 1 + course(k), complex) for k in range(41)]
+    assert _drifts_evenly(found, 1) == even

@@ -362,6 +362,20 @@ def test_the_signature_of_another_certificate_is_one(certificate, keys, signers,
     assert "it is the signature of another certificate" in sentence
 
 
+def test_the_signature_of_a_file_is_none_of_a_certificate(
+    certificate, keys, signers, gfor, tmp_path
+):
+    report = tmp_path / "report.json"
+    report.write_text("{}", "utf-8")
+    assert gfor("sign", report, "--sign", keys / "ed25519")[0] == 0
+    for name in signatures_of(certificate).names():
+        its = report.with_name(name.replace("certificate", "report.json"))
+        shutil.copy(its, certificate / name)
+    code, state, sentence = seen(gfor, certificate, "--signers", signers())
+    assert (code, state) == (5, "changed")
+    assert "it is no signature of a certificate: it is one of report.json" in sentence
+
+
 def test_a_signature_made_for_something_else_is_none(certificate, keys, signers, gfor):
     message = (certificate / "certificate.pae").read_bytes()
     made = sign_with(_private(keys, "ed25519"), message, "git")
