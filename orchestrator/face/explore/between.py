@@ -1,6 +1,7 @@
 """Between the computed values of a saved page: which modes belong together, and how far a straight line is off."""
 
 import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -57,7 +58,8 @@ def judged_cell(
     -------
     dict or None
         ``at`` the cell, ``corners`` the places, ``modes`` of each followed mode its place at every corner, ``least`` by
-        how many points of damping the least damped mode is off in the middle, ``most`` any mode that the map shows.
+        how many points of damping the least damped mode is off in the middle, ``hertz`` by how many Hz, ``most`` by how
+        many points any mode that the map shows.
         None where the middle has no answer, or no mode can be followed.
     """
     modes = followed_modes([eigenvalues_of(answers[place]) for place in places])
@@ -76,11 +78,14 @@ def judged_cell(
         ]
     )
     least, most = errors(drawn, right)
+    shown, true = drawn[np.argmin(_damping(drawn))], right[np.argmin(_damping(right))]
+    hertz = float(abs(shown.imag - true.imag)) / math.tau
     return {
         "at": {key: list(ends) for key, ends in cell.items()},
         "corners": list(places),
         "modes": modes,
         "least": float(f"{least:.2g}"),
+        "hertz": float(f"{hertz:.2g}"),
         "most": float(f"{most:.2g}"),
     }
 

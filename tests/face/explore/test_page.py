@@ -405,7 +405,7 @@ def halfway_between_two(view, slider):
     said.get_by_text("between computed values").wait_for()
     shown_percent = float(re.search(r"≈ [\d.]+ Hz, ([\d.]+) %", said.inner_text())[1])
     assert shown_percent == pytest.approx(least, abs=0.02)  # the slider has a thousand places
-    assert f"off by {cell['least']:g} points" in said.inner_text()
+    assert f"off by {cell['least']:g} points and {cell['hertz']:.4f} Hz" in said.inner_text()
     assert cell["least"] < 1
     slider.evaluate("one => one.dispatchEvent(new Event('change'))")
     view.locator("#verdict.good").wait_for()

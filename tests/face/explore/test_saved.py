@@ -125,6 +125,8 @@ def test_a_cell_whose_middle_has_no_answer_is_not_interpolated():
 
     both = [answer_of(-1 + 10j), answer_of(-2 + 10j)]
     assert judged_cell({"p": (1.0, 2.0)}, [0, 1], both, refuse) is None
+    bent = judged_cell({"p": (1.0, 2.0)}, [0, 1], both, lambda point: answer_of(-1.5 + 10.5j))
+    assert bent["hertz"] == pytest.approx(0.5 / 6.283, rel=0.05)  # two digits of it
     far = [answer_of(-1 + 10j), answer_of(-1 + 20j)]
     assert judged_cell({"p": (1.0, 2.0)}, [0, 1], far, lambda point: far[0]) is None
 

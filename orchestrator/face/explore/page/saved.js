@@ -44,7 +44,7 @@ async function dragSaved(name, value) {
   paintMap(); paintTable();
   const least = [...between].sort((a, b) => a.damping - b.damping)[0];
   $("verdict").className = "estimated";
-  $("verdict").textContent = `${name} = ${number(value)}, between computed values: least damped ≈ ${fixed(least.hz, 3)} Hz, ${fixed(least.damping, 2)} % (halfway it is off by ${number(cell.least, 2)} points, any mode by at most ${number(cell.most, 2)}); computed on release`;
+  $("verdict").textContent = `${name} = ${number(value)}, between computed values: least damped ≈ ${fixed(least.hz, 3)} Hz, ${fixed(least.damping, 2)} % (halfway it is off by ${number(cell.least, 2)} points${cell.hertz === undefined ? "" : ` and ${fixed(cell.hertz, 4)} Hz`}, any mode by at most ${number(cell.most, 2)}); computed on release`;
   painted(begin, "estimate");
 }
 // The followed modes of a cell, on straight lines between its corners.
