@@ -128,10 +128,13 @@ def _angle(factor: float) -> Callable[[Recording], Recording]:
     return changed
 
 
-READINGS = (
+READINGS_OF_SIGN = (
     Reading("P counts into the plant", ("p",), -1, _power(-1, 1)),
     Reading("Q counts into the plant", ("q",), -1, _power(1, -1)),
     Reading("P and Q count into the plant", ("p", "q"), -1, _power(-1, -1)),
+)
+READINGS = (
+    *READINGS_OF_SIGN,
     Reading("P and Q are of one phase", ("p", "q"), 3, _power(3, 3), "", _LEAVES),
     Reading("P is of one phase", ("p",), 3, _power(3, 1), "", _LEAVES),
     Reading("Q is of one phase", ("q",), 3, _power(1, 3), "", _LEAVES),
@@ -178,6 +181,21 @@ def question_readings(comparison: EventComparison, bases: PortBases) -> list[Que
         explained += _meter_elsewhere(comparison, bases, whole)
         explained += _rated_otherwise(comparison, whole)
     return [min(explained, key=lambda one: one[0])[1]] if explained else []
+
+
+def sign_that_starts(device: PlayedDevice, event: RecordedEvent, bases: PortBases) -> str:
+    """Name the sign of P, Q or both with which a device starts that refuses the recording as it is read.
+
+    Empty where none helps, or where P counts out of the plant."""
+    before = event.start.power.real
+    if before >= 0:
+        return ""
+    near = cut_event(event, _AFTER, _BEFORE)
+    for reading in READINGS_OF_SIGN:
+        if reading.fits(event.recording) and [*_error_left(device, near, reading, bases)]:
+            typed = " ".join(f"--channel '{one}'" for one in reading.remedy(event.recording))
+            return f"P is {before:.3g} pu before the event; if {reading.name}, give {typed}: so the device starts"
+    return ""
 
 
 def _likeliest(comparison: EventComparison, bases: PortBases, error: float) -> list[Question]:

@@ -22,7 +22,7 @@ from orchestrator.studies.validation.event import (
 )
 from orchestrator.studies.validation.explain import explain_errors
 from orchestrator.studies.validation.fit import Fit, fit_parameters
-from orchestrator.studies.validation.hypotheses import question_readings
+from orchestrator.studies.validation.hypotheses import question_readings, sign_that_starts
 from orchestrator.studies.validation.limits import (
     Criterion,
     LimitTables,
@@ -141,7 +141,7 @@ def validate_device(
     comparisons = []
     for event in events_of(request):
         report(f"{event.recording.label}: driving {request.device.name}")
-        comparison = _compare(request.device, event)
+        comparison = _compare(request.device, event, request.bases)
         asked = question_readings(comparison, request.bases)
         comparisons.append(replace(comparison, questions=comparison.questions + tuple(asked)))
     others = _others(request, [one.event for one in comparisons], report)
@@ -169,7 +169,7 @@ def _others(
     found = []
     for event in events:
         report(f"{event.recording.label}: driving {device.name}")
-        found.append(_compare(device, event))
+        found.append(_compare(device, event, request.bases))
     return found
 
 
@@ -199,12 +199,13 @@ def add_fit(result: ValidationResult, report: Report) -> ValidationResult:
     return replace(result, fit=fit, confirmations=confirmations)
 
 
-def _compare(device: PlayedDevice, event: RecordedEvent) -> EventComparison:
+def _compare(device: PlayedDevice, event: RecordedEvent, bases: PortBases) -> EventComparison:
     """The comparison; where the device refuses to run, what was asked of the recording is said with it."""
     try:
         return with_doubt_between(compare_with(device, event))
     except CosimError as error:
         asked = [sentence(one) for one in event.questions if one.keeps_open]
+        asked += filter(None, [sign_that_starts(device, event, bases)])
         if not asked:
             raise
         raise InputError(f"{event.recording.label}: {'; '.join(asked)}. {error}") from error

@@ -21,7 +21,12 @@ def item(**record):
 
 
 def test_an_outage_without_any_verdict_is_told_by_its_first_point():
-    plan = SimpleNamespace(wanted=SimpleNamespace(damping=0.2), points=("p07",))
+    plan = SimpleNamespace(
+        wanted=SimpleNamespace(damping=0.2),
+        points=("p07",),
+        outages=(),
+        prepared=SimpleNamespace(regions=SimpleNamespace(has_areas=False)),
+    )
     lost = item(status=Status.POWER_FLOW)
     table = view.overview(SimpleNamespace(result=SimpleNamespace(plan=plan, items=(lost,))))
     assert [column.cell(table.rows[0]) for column in table.columns] == [

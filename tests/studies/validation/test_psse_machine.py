@@ -4,6 +4,7 @@
 PowerSimulationsDynamics.jl (test/benchmarks/psse/SEXS, PSS/E 34's recording of a trip of line 101-102 at 1 s), the
 first 6 s. Bus 101 is infinite and the load a constant impedance, so that Kirchhoff's laws give angle, P and Q."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -107,3 +108,19 @@ def test_the_parameters_of_pss_es_machine_are_found_again(case, recording):
     for row in found.fitted().itertuples():
         assert row.identifiable
         assert row.value == pytest.approx(truth[row.parameter], rel=0.02)
+
+
+def test_a_machine_that_refuses_to_draw_power_is_asked_about_the_sign(case, recording, tmp_path):
+    """As a meter that counts into the plant: the turbine's least power is 0."""
+    text = case.read_text(encoding="utf-8").replace('"constant_power"', '"tgov1"')
+    path = tmp_path / "case.toml"
+    path.write_text(text.replace("governor.output_is_torque = false\n", ""), encoding="utf-8")
+    turned = recording.assign(p_mw=-recording.p_mw)
+    words = r"P is -1 pu before the event; if P counts into the plant, give --channel 'p=-p_mw'"
+    with pytest.raises(gfor_in_python.CosimError, match=words) as refused:
+        validated(path, turned)
+    assert "V_MIN" in str(refused.value)
+    (typed,) = re.findall(r"--channel '([^']*)'", str(refused.value))
+    assert (
+        validated(path, turned, channels=[typed]).questions == validated(path, recording).questions
+    )
