@@ -24,6 +24,7 @@ class QuestionKind(StrEnum):
     SLOW_SAMPLES = "slow samples"
     MISSING = "missing samples"
     FILLED = "filled samples"
+    UNMEASURED = "P or Q missing"
     GAP_AT_EVENT = "gap at the event"
     LOST_JUMP = "angle lacks a jump"
     START = "starts elsewhere"

@@ -15,7 +15,7 @@ from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.core.errors import InputError
 from orchestrator.studies.validation.averaging import averaged
 from orchestrator.studies.validation.channels import RecordedChannel, channels_in, in_base, unit_of
-from orchestrator.studies.validation.filled import Mask, filled_samples
+from orchestrator.studies.validation.filled import Mask, filled_samples, runs_of
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.transformer import AT_PORT, Between, Beyond
 
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 _FEWEST = 20  # samples of a recording that can be compared with anything
 _LONGEST_GAP = 0.25  # gap [s] that a straight line bridges in the voltage that drives the device
+# gap [s] of P or Q beside a known voltage, from which on a swing's largest error may lie in it
+_LONG_UNMEASURED = 0.1
 _TURN = 2 * np.pi
 _NEAR_A_TURN = 0.2  # part of a turn by which a jump of the angle may miss a whole one
 _AS_BESIDE = 3.0  # times the largest change beside it, by which an angle moves while it wraps
@@ -488,7 +490,13 @@ def _evened(reading: _Reading, voltage: Complex, power: Complex) -> Recording:
     drives = _near(even, times[driven], interval)
     good = drives & _near(even, times[known], interval)
     stale = sum(int(one[part].sum()) for one in filled)
-    missing = int((~good).sum())
+    lost = list(runs_of(drives & ~good))
+    low, high = max(lost, key=lambda run: run[1] - run[0], default=(0, 0))
+    is_long = (high - low) * interval > _LONG_UNMEASURED
+    if is_long:
+        length, at = (high - low) * interval, float(even[low])
+        reading.ask(QuestionKind.UNMEASURED, length=length, at=at)
+    missing = int((~(drives if is_long else good)).sum())
     if stale:
         at = float(times[np.flatnonzero(filled[0][part] | filled[1][part])[0]])
         reading.ask(QuestionKind.FILLED, count=stale, of=len(even), at=at, longest=longest)

@@ -138,6 +138,13 @@ def _missing(x: Figures) -> str:
     )
 
 
+def _unmeasured(x: Figures) -> str:
+    return (
+        f"P or Q is missing for {x['length']:.3g} s from {x['at']:.4g} s on, where the voltage is known: what the "
+        "plant did there is not compared. Give a recording without the gap, or an event apart from it"
+    )
+
+
 def _filled(x: Figures) -> str:
     return (
         f"{x['count']} samples stand still while those before and after move, from {x['at']:.4g} s on: the recorder "
@@ -272,6 +279,7 @@ _SENTENCES: Mapping[QuestionKind, Callable[[Figures], str]] = {
     QuestionKind.SLOW_SAMPLES: _slow_samples,
     QuestionKind.MISSING: _missing,
     QuestionKind.FILLED: _filled,
+    QuestionKind.UNMEASURED: _unmeasured,
     QuestionKind.GAP_AT_EVENT: _gap_at_event,
     QuestionKind.LOST_JUMP: _lost_jump,
     QuestionKind.START: _start,

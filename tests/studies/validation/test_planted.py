@@ -114,6 +114,10 @@ PLANTED = {
     ),
     "the angle is of a filtered frequency": (of_filtered_frequency, "angle lacks a jump"),
     "samples are missing at the event": (lambda f: without(f, 0.98, 1.06), "gap at the event"),
+    "P is missing beside a known voltage": (
+        lambda f: f.assign(p_mw=f.p_mw.mask(f.time.between(1.2, 1.5))),
+        "P or Q missing",
+    ),
     "a gap at the event is filled": (lambda f: filled(f, 0.98, 1.06), "gap at the event"),
     "P counts into the plant": (lambda f: f.assign(p_mw=-f.p_mw), "read otherwise"),
     "Q counts into the plant": (lambda f: f.assign(q_mvar=-f.q_mvar), "read otherwise"),
@@ -241,6 +245,7 @@ HONEST = {
         frac=0.95, random_state=1
     ).sort_index(),
     "samples are missing after the event": lambda f: without(f, 2.0, 2.1),
+    "P is missing for a moment": lambda f: f.assign(p_mw=f.p_mw.mask(f.time.between(1.6, 1.65))),
     "a recorder of four digits": lambda f: f.round({"v_pu": 4, "angle_deg": 2, "p_mw": 1}),
 }
 
