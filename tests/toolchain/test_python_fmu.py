@@ -208,6 +208,8 @@ def test_initial_unknowns_are_complete_and_list_every_parameter_that_moves_them(
             if parameter.type == "Boolean" or parameter.name == "internal_step":
                 continue
             shift = 1 if parameter.type == "Integer" else 1e-3 * abs(parameter.start) + 1e-6
+            if parameter.maximum is not None and parameter.start + shift > parameter.maximum:
+                shift = -shift
             before = batch.read().copy()
             component.set({parameter.name: parameter.start + shift})
             changed = {n for n, a, b in zip(computed, before, batch.read(), strict=True) if a != b}

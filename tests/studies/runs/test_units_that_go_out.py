@@ -10,7 +10,7 @@ from orchestrator.studies.immittance.margins import Margin, NyquistMargins, marg
 from orchestrator.studies.sensitivities.sensitivities import Sensitivity
 from orchestrator.studies.sensitivities.view import rows_of
 from orchestrator.studies.siting.confirmation import Confirmation
-from orchestrator.studies.siting.view import _confirmation, _modes, _shift
+from orchestrator.studies.siting.view import _modes, _shift, confirmation_json
 from tests.support.scenarios import bare_scenario
 
 EIGENVALUE = -0.3137 + 3.7193j
@@ -103,7 +103,7 @@ def test_of_a_place_for_a_device():
 
 
 def test_of_what_coupled_fmus_say_of_a_place():
-    said = _confirmation(
+    said = confirmation_json(
         Confirmation(
             "bus_1",
             predicted=-0.0517 + 0.0231j,
