@@ -35,6 +35,9 @@ def test_a_page_is_small_and_asks_nothing_of_the_network(path):
     assert len(text.encode()) <= LARGEST
     assert not re.search(r"""(src|href)=["']?(https?:)?//""", text)
     assert not re.search(r"""@import|url\(["']?(https?:)?//""", text)
+    assert not re.search(r"[\"' ]/(home|root|tmp|work)/", text), (
+        "a folder of the machine that made it"
+    )
 
 
 @pytest.mark.parametrize("name", ["two_area"])
