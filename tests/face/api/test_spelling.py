@@ -38,6 +38,7 @@ COMMANDS_ALONE = {
         "beside",
         "contest",
         "details",
+        "html",
         "models",
         "generator",
         "junit",

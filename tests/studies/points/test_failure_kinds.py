@@ -132,6 +132,7 @@ _CUTS = {
 
 ALLOWED = {
     "orchestrator/simulation/federation/helics_calls.py": 1,  # what the library of HELICS says
+    "orchestrator/cases/new/refusal.py": 1,  # only so that a file is not named twice in one line
 }
 """Files that may look into a text, and how often."""
 
