@@ -11,10 +11,10 @@ import threading
 import time
 import traceback
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from multiprocessing.connection import Connection, Pipe, wait
-from typing import cast
+from typing import Any, cast
 
 from fmus.toolchain import temporary
 from orchestrator.core.cores import number_of_cores
@@ -27,6 +27,7 @@ from orchestrator.studies.runs.run import RunResult
 Outcome = RunResult | BaseException
 
 Report = Callable[[int, int], None]  # told how many steps are done, of how many
+_HELD_BACK = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)  # until all copies are made
 _PATIENCE = 20.0  # how long a copy that was told to end is waited for [s]
 
 
@@ -54,9 +55,9 @@ class SideBySide:
     def _make(self) -> None:
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
-        blocked = signal.pthread_sigmask(
-            signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGUSR1}
-        )
+        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, _HELD_BACK)
+        came: list[int] = []  # signals that another thread took, which blocks none
+        handlers = _note_signals(came)
         try:
             for _ in range(self._number):
                 ours, theirs = Pipe()
@@ -66,13 +67,17 @@ class SideBySide:
                     warnings.simplefilter("ignore", DeprecationWarning)
                     process = os.fork()
                 if not process:
+                    _handle_signals(handlers)
                     for other in (ours, *self._copies):
                         other.close()
                     _serve(parent, theirs, self._work, blocked)
                 theirs.close()
                 self._copies[ours] = process
         finally:
+            _handle_signals(handlers)
             signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+            for number in came:
+                signal.raise_signal(number)
 
     def outcomes(
         self, count: int, report: Callable[[int, int, int], None]
@@ -150,6 +155,19 @@ class SideBySide:
                         os.kill(process, signal.SIGKILL)
                     time.sleep(0.005)
             self._copies.clear()
+
+
+def _note_signals(came: list[int]) -> dict[signal.Signals, Any]:
+    """Let signals be noted only, and return what handled them; a thread that is not the main one handles none."""
+    if threading.current_thread() is not threading.main_thread():
+        return {}
+    return {one: signal.signal(one, lambda number, _: came.append(number)) for one in _HELD_BACK}
+
+
+def _handle_signals(handlers: Mapping[signal.Signals, Any]) -> None:
+    """Let signals be handled as before; one that no code of Python handled is left to the system."""
+    for one, handler in handlers.items():
+        signal.signal(one, signal.SIG_DFL if handler is None else handler)
 
 
 def _was_interrupted(outcome: Outcome) -> bool:

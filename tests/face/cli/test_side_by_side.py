@@ -5,6 +5,7 @@ import os
 import pickle
 import signal
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -253,6 +254,29 @@ def test_a_signal_while_the_copies_are_made_leaves_none(monkeypatch):
     while copies_of(os.getpid()) != before and time.monotonic() < end:
         time.sleep(0.01)
     assert copies_of(os.getpid()) == before
+
+
+def test_a_signal_that_another_thread_takes_waits_for_the_copies_as_well(monkeypatch):
+    """The mask of the main thread does not hold it back: BLAS or a progress bar may have threads of their own."""
+    before, fork = copies_of(os.getpid()), os.fork
+    ready, over = threading.Event(), threading.Event()
+    other = threading.Thread(target=lambda: (ready.set(), over.wait()))
+    other.start()
+    ready.wait()
+
+    def interrupted():
+        process = fork()
+        if process:
+            signal.pthread_kill(other.ident, signal.SIGTERM)
+            time.sleep(0.05)  # Python handles it in the main thread, here at the latest
+        return process
+
+    monkeypatch.setattr(side_by_side.os, "fork", interrupted)
+    with calls.terminable(), pytest.raises(KeyboardInterrupt), SideBySide(2, lambda *_: None):
+        pass
+    over.set()
+    other.join()
+    assert [pid for pid in copies_of(os.getpid()) if pid not in before] == []
 
 
 def test_an_interrupt_when_all_is_done_is_not_lost():
