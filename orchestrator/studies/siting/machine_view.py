@@ -12,7 +12,6 @@ from rich.table import Table
 from orchestrator.core.errors import few
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder, write_text
-from orchestrator.linear.spectra.modes import Mode
 from orchestrator.output.report.html.elements import document, table
 from orchestrator.output.report.notebook import page
 from orchestrator.output.report.tables import make_table
@@ -23,7 +22,12 @@ from orchestrator.output.results.storage import save_json, save_table
 from orchestrator.studies.points.code import code_hash
 from orchestrator.studies.siting.confirmation import Confirmation
 from orchestrator.studies.siting.machines import CONTROLLER, PART, MachineSites
-from orchestrator.studies.siting.view import confirmation_json, end_of_search, least_then
+from orchestrator.studies.siting.view import (
+    confirmation_json,
+    end_of_search,
+    least_then,
+    with_damping,
+)
 
 UNIT = "points of damping by 1 pu of voltage for 1 pu of speed, with its phase tuned"
 _SHOWN = 12  # machines in a table, best first
@@ -88,12 +92,13 @@ class MachineSiting:
 
 
 def answer(result: MachineSites) -> str:
-    label, mode = next(iter(result.modes.items()))
+    label = result.first
+    mode = result.modes[label]
     best = result.ranking[:3]
     figures = ", ".join(f"{name} {result.shifts[label][name].damping:+.3g}" for name in best)
     return (
         f"{best[0]} is the machine where a POD at the voltage regulator helps most, for the least damped mode "
-        f"({_called(label, mode)}): {figures} {UNIT}{_command(result)}"
+        f"({with_damping(label, mode)}): {figures} {UNIT}{_command(result)}"
     )
 
 
@@ -107,12 +112,6 @@ def _command(result: MachineSites) -> str:
         words += ["--set", f"{key}={str(value).lower() if isinstance(value, bool) else value}"]
     words += ["--component", name, "--controller", CONTROLLER]
     return f"; design one at {name} with: {shlex.join(words)}"
-
-
-def _called(label: str, mode: Mode) -> str:
-    hertz = f"{mode.frequency_hz:.3f} Hz"
-    title = label if hertz in label else f"{label}, {hertz}"
-    return f"{title}, {mode.damping_percent:.2f} %"
 
 
 def sureness(result: MachineSites) -> list[str]:

@@ -12,7 +12,7 @@ from orchestrator.core.errors import few
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder, write_text
 from orchestrator.core.truth import all_true
-from orchestrator.linear.spectra.modes import damping_percent
+from orchestrator.linear.spectra.modes import Mode, damping_percent
 from orchestrator.output.report.html.elements import SHADES, Figures, damping, document, table
 from orchestrator.output.report.html.network_map import network_map
 from orchestrator.output.report.notebook import page
@@ -151,7 +151,7 @@ def _best_confirmed(result: SiteResult, among: str) -> str:
     small = ", ".join(f"{bus} {shown(result, result.least(bus)[0])}" for bus in by_support[:3])
     order = f"the order of the {len(result.confirmations)} places that coupled FMUs computed"
     steps = f"{seen.mode.damping_percent:.2f} % → {first.damping:.2f} %"
-    mode = f"the mode {_title(seen)}, the least damped without it"
+    mode = f"the mode {title_of_mode(seen.label, seen.mode)}, the least damped without it"
     reached = f"{steps} for {mode}, with {_rated(result)}{pod}"
     return (
         f"{first.bus} is the best place for {device_title(result)}{among}: {reached}{_lowered(result, first)}; then "
@@ -166,13 +166,19 @@ def _lowered(result: SiteResult, first: Confirmation) -> str:
     return f"{', but' if lower else ';'} {least_then(first, before)}"
 
 
-def _title(seen: SeenMode) -> str:
-    hertz = f"{seen.mode.frequency_hz:.3f} Hz"
-    return seen.label if hertz in seen.label else f"{seen.label}, {hertz}"
+def title_of_mode(label: str, mode: Mode) -> str:
+    """Name a mode by its label and its frequency, which the label may tell already."""
+    hertz = f"{mode.frequency_hz:.3f} Hz"
+    return label if hertz in label else f"{label}, {hertz}"
+
+
+def with_damping(label: str, mode: Mode) -> str:
+    """Name a mode by its label, frequency and damping."""
+    return f"{title_of_mode(label, mode)}, {mode.damping_percent:.2f} %"
 
 
 def _called(seen: SeenMode) -> str:
-    return f"{_title(seen)}, {seen.mode.damping_percent:.2f} %"
+    return with_damping(seen.label, seen.mode)
 
 
 def sureness(result: SiteResult) -> list[str]:
