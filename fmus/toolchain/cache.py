@@ -1,7 +1,8 @@
 """Where built kernels and FMUs are kept between runs, and how a kept file is checked before it is used again.
 
-Beside every kept file lies its SHA-256. A file that differs from it, because a disk, a crash or a person changed it, is
-built again; it is never run."""
+Beside every kept file lies a list of SHA-256: one line for each content that gfor wrote there. A file that is not on
+its list, because a disk, a crash or a person changed it, is built again; it is never run. A writer adds its line before
+it puts the file in place, so a reader finds a listed content at any moment, whoever else writes."""
 
 import hashlib
 import logging
@@ -14,6 +15,8 @@ from fmus.toolchain.extras import SetupError
 
 _LOG = logging.getLogger("gfor")
 _HASH = ".sha256"
+_LONGEST_LIST = 4096
+"""Bytes of a list of SHA-256, about 60 lines; a longer one, of a file written again and again, begins anew."""
 _checked: dict[Path, tuple[int, int, int]] = {}
 """Files found intact in this process: inode, size and time of the last change."""
 
@@ -47,21 +50,17 @@ def intact(path: Path) -> bool:
         mark = (seen.st_ino, seen.st_size, seen.st_mtime_ns)
         if _checked.get(path) == mark:
             return True
-        kept = (
-            _hash_file(path).read_text(encoding="ascii").strip()
-            if _hash_file(path).exists()
-            else "missing"
-        )
         found = hashlib.sha256(path.read_bytes()).hexdigest()
+        listed = _hash_file(path).read_bytes().split() if _hash_file(path).exists() else None
     except (FileNotFoundError, NotADirectoryError):
         return False
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
         _LOG.warning("cache: %s cannot be read (%s); it is built again", path, error)
         return False
-    if found != kept:
+    if listed is None or found.encode() not in listed:
         why = (
             "has no SHA-256 beside it"
-            if kept == "missing"
+            if listed is None
             else "differs from the SHA-256 kept beside it"
         )
         _LOG.warning("cache: %s %s, so it may be damaged or altered; it is built again", path, why)
@@ -76,8 +75,7 @@ def keep(path: Path, content: bytes) -> Path:
     ``path``: Below a `cache_directory`; its folder is created where missing."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        _write_whole(_hash_file(path), (hashlib.sha256(content).hexdigest() + "\n").encode())
-        _write_whole(path, content)
+        _put_in_place(path, content)
     except OSError as error:
         raise CacheError(
             f"the cache cannot be written: {path}: {error.strerror or error}; FMUs and libraries are built there once "
@@ -91,15 +89,28 @@ def _hash_file(path: Path) -> Path:
     return path.with_name(path.name + _HASH)
 
 
-def _write_whole(path: Path, content: bytes) -> None:
+def _put_in_place(path: Path, content: bytes) -> None:
     partial = path.with_name(f"{path.name}.{uuid.uuid4().hex}.part")
     try:
         partial.write_bytes(content)
         partial.chmod(0o755)
+        _list_hash(_hash_file(path), hashlib.sha256(content).hexdigest())
         partial.replace(path)
     except OSError:
         partial.unlink(missing_ok=True)
         raise
+
+
+def _list_hash(path: Path, digest: str) -> None:
+    """Add a SHA-256 to the list beside a file; the list is appended to, so that no writer loses another's line."""
+    line = f"\n{digest}\n".encode()  # the first line break ends a line that a crash cut
+    if path.exists() and path.stat().st_size > _LONGEST_LIST:
+        shorter = path.with_name(f"{path.name}.{uuid.uuid4().hex}.part")
+        shorter.write_bytes(path.read_bytes()[-len(line) :] + line)  # the last one is in place now
+        shorter.replace(path)
+        return
+    with path.open("ab") as hashes:
+        hashes.write(line)
 
 
 def _home() -> Path:

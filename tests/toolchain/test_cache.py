@@ -60,6 +60,26 @@ def test_a_damaged_library_is_compiled_again(own_cache, damage, caplog):
     assert not caplog.text
 
 
+def test_a_file_is_intact_at_each_moment_of_its_being_written_anew(tmp_path, monkeypatch, caplog):
+    """Two versions of gfor in one home folder build the same file with different bytes."""
+    path = keep(tmp_path / "library.so", b"version 0")
+    seen = []
+    move = Path.replace
+
+    def look_and_move(partial, target):
+        seen.append(intact(path))
+        moved = move(partial, target)
+        seen.append(intact(path))
+        return moved
+
+    monkeypatch.setattr(Path, "replace", look_and_move)
+    for version in range(200):  # the list of SHA-256 begins anew on the way
+        keep(path, b"version %d" % version)
+    assert all(seen)
+    assert not caplog.text
+    assert path.with_name("library.so.sha256").stat().st_size < 5000
+
+
 def gfor_in(folder, *arguments):
     """`gfor` in a process of its own: there nothing is known to be intact yet."""
     environment = {**os.environ, "GFOR_COSIM_CACHE": str(folder)}
