@@ -334,7 +334,9 @@ class _Reader:
             unit = unit_of(info, table.unit)
             if unit == PER_UNIT or unit.endswith(_OF_POWER):
                 whole = bases.power_unit(unit, table.base, info.name)
-                return SignalMap(info.name, 1 / whole, 0.0, PER_UNIT)
+                absolute = unit != PER_UNIT or table.base not in (None, "S_n")
+                per_rating = absolute and "S_n" in self._table.start
+                return SignalMap(info.name, 1 / whole, 0.0, PER_UNIT, per_rating)
         return SignalMap(info.name, 1.0, 0.0, "1" if plain else unit_of(info, table.unit))
 
     def _switch(self, table: SignalTable) -> SignalMap:

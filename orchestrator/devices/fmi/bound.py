@@ -15,7 +15,7 @@ from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.core.errors import ComponentError, InputError, NotFiniteError
 from orchestrator.devices.fmi.component import Component, Derived, RealBatch
 from orchestrator.devices.fmi.interrupts import calls
-from orchestrator.devices.fmi.port import PORT, START, BoundDescription, PhasorMap
+from orchestrator.devices.fmi.port import PORT, START, BoundDescription, PhasorMap, SignalMap
 
 _SOURCE = Path(__file__).with_name("port_adapter.c")
 
@@ -123,6 +123,12 @@ class BoundComponent(Derived):
         factor = S_n / self._port.rating if current.per_rating else 1.0
         self._adapter.current.matrix[:] = [factor * element for element in current.matrix]
         self._adapter.power_scale = SYSTEM_BASE_MVA / S_n
+        for other, name in zip(self._others, self._inner_names, strict=False):
+            if name in self._port.signals:
+                other.factor = self._factor(self._port.signals[name])
+
+    def _factor(self, signal: SignalMap) -> float:
+        return signal.factor_at(self._start["S_n"] / self._port.rating)
 
     @property
     def one_thread(self) -> str | None:
@@ -163,11 +169,14 @@ class BoundComponent(Derived):
 
     def set(self, values: Mapping[str, float | bool], *, own: bool = False) -> None:
         """Set variables by name; ``own`` means the FMU's own names."""
+        if not own:
+            start = {name: float(value) for name, value in values.items() if name in self._start}
+            self._start |= start
+            self._start_is_new |= bool(start)
         for name, value in values.items():
             if not own and name in self._start:
-                self._start[name] = float(value)
-                self._start_is_new = True
-            elif not own and name in PORT:
+                continue  # known before the others, whose base S_n may be
+            if not own and name in PORT:
                 self._write_port(name, float(value))
             elif own or name in self._inner_names:
                 target = name if own else self._inner_names[name]
@@ -175,7 +184,7 @@ class BoundComponent(Derived):
                 scaled = signal is not None and self.description.variables[name].type == "Real"
                 self.inner.set(
                     {
-                        target: (value - signal.offset) / signal.factor
+                        target: (value - signal.offset) / self._factor(signal)
                         if signal and scaled
                         else value
                     }

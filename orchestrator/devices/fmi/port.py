@@ -73,16 +73,27 @@ class StartMap:
 
 @dataclass(frozen=True)
 class SignalMap:
-    """Another variable under a name and in a unit of ours: ``factor·x + offset``; a Boolean as it is."""
+    """Another variable under a name and in a unit of ours: ``factor·x + offset``; a Boolean as it is.
+
+    Attributes
+    ----------
+    per_rating
+        If its own unit is a power and ours is per unit of the S_n that it is given: ``factor`` is that at its rating.
+    """
 
     variable: str
     factor: float
     offset: float
     unit: str
+    per_rating: bool = False
 
     def of(self, value: float) -> float:
-        """A value of the FMU's own variable, in our unit."""
+        """A value of the FMU's own variable, in our unit, at its rating as delivered."""
         return self.factor * value + self.offset
+
+    def factor_at(self, rating: float) -> float:
+        """Return the factor where S_n is so many times the rating as delivered."""
+        return self.factor / rating if self.per_rating else self.factor
 
 
 @dataclass(frozen=True)

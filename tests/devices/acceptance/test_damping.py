@@ -4,7 +4,11 @@ from dataclasses import replace
 
 import pytest
 
+from orchestrator.devices.acceptance.checks.subject import Use
 from orchestrator.devices.acceptance.runner import check_fmu
+from orchestrator.devices.binding.binding import bind
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.devices.fmi.instance import open_component
 from orchestrator.devices.fmi.limits import Limits
 from tests.devices.acceptance.gallery.build import build
 from tests.devices.acceptance.gallery.members import START, binding, converter, faulty
@@ -86,8 +90,8 @@ def test_a_controller_whose_output_is_not_shown_is_judged_by_the_power(tmp_path)
 
 TIRES = (
     "(1 - 0.9 * fmin(1, 2 * m[WORKED]))",
-    "POD changes with time",
-    "otherwise 3 s after strong swings",
+    "POD tires",
+    "otherwise 3 s after strong swings, in which it gave and took 0.",
 )
 """It tires until its output is 0.6 of its limit: afterwards about 40 % of its answer are missing."""
 
@@ -143,6 +147,45 @@ def test_a_limit_is_judged_by_the_power_where_no_output_shows_it(tmp_path):
     found = check_fmu(file, bound, LIMITS, ("pod",), run_for=0.3)
     assert found.faults == ["POD limit not as declared"]
     assert "no more than 0.05" in found.failures[0].evidence
+
+
+def in_megawatts(tmp_path, **defines):
+    """Its output and its limit in MW, and a rating that it is given."""
+    source = converter("in_mw", pod=True, POD_UNIT="z[S_N]", POD_MOST="(0.1 * RATING)", **defines)
+    own = {
+        "pod_p.enabled": {"name": "pod_on"},
+        "pod_p.limit": {"name": "pod_most", "unit": "MW", "start": 150.0},
+        "delta_p_pod": {"name": "pod_out", "unit": "MW"},
+    }
+    source = replace(
+        source, variables=tuple(replace(v, **own.get(v.name, {})) for v in source.variables)
+    )
+    bound = {"start.S_n": "S_n"} | {f'signals."{ours}"': its["name"] for ours, its in own.items()}
+    tables = "".join(f'[{place}]\nvariable = "{its}"\n' for place, its in bound.items())
+    path = tmp_path / "in_mw.toml"
+    usual = binding("rectangular", current='base = "100 MVA"', start=f"{START}\n{tables}")
+    path.write_text(usual, encoding="utf-8")
+    return build(source, tmp_path), path
+
+
+@pytest.mark.parametrize("S_n", [1500.0, 750.0, 3000.0])
+def test_a_limit_in_megawatts_is_that_of_the_rating_which_it_is_given(S_n, tmp_path):
+    """150 MW are 0.2 pu of 750 MVA; what shows its output on the rating as delivered is told."""
+    use = Use(values={"S_n": S_n})
+    file, bound = in_megawatts(tmp_path)
+    (*_, found) = check_fmu(file, bound, LIMITS, ("pod",), run_for=0.3, use=use, seed=1).results
+    assert found.verdict == "pass", found.evidence
+    file, bound = in_megawatts(tmp_path, POD_SHOWN="RATING")
+    report = check_fmu(file, bound, LIMITS, ("pod",), run_for=0.3, use=use, seed=1)
+    assert report.faults == ([] if S_n == 1500 else ["POD limit not as declared"])
+
+
+def test_what_is_bound_in_megawatts_reads_in_per_unit_of_the_rating_it_is_given(tmp_path):
+    file, bound = in_megawatts(tmp_path)
+    with open_component("it", bind(read_description(file), bound), isolated=False) as component:
+        component.set({"pod_p.limit": 0.12, "S_n": 500.0})
+        assert component.values(["pod_p.limit"])["pod_p.limit"] == pytest.approx(0.12)
+        assert component.inner.values(["pod_most"])["pod_most"] == pytest.approx(60.0)
 
 
 def test_a_parameter_under_another_name_is_tried_like_any_other(tmp_path):

@@ -1,7 +1,6 @@
 """The check of a damping controller (POD) in swings of every size and direction, at other points, steps and times."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from math import exp
 from typing import Any
 
@@ -16,6 +15,12 @@ from orchestrator.devices.acceptance.checks.base import (
     not_applicable,
     passed,
     remarked,
+)
+from orchestrator.devices.acceptance.checks.damping_memory import (
+    DampingFault,
+    find_growth,
+    find_tiredness,
+    find_windup,
 )
 from orchestrator.devices.acceptance.checks.damping_swings import (
     DampingBench,
@@ -43,6 +48,8 @@ _BEYOND = 12.0
 _LARGEST = 0.006  # largest swing of the frequency [pu] in which its output is compared
 _EVEN = 0.1  # part of the answer by which it may differ where nothing but size or direction differs
 _ALIKE = 0.8  # correlation of two courses of one controller at different points
+_ALIKE_AT_LIMIT = 0.6  # the same where a limit cuts one of them, and stops what integrates
+_AT_LIMIT = 0.9  # output in parts of its declared limit from which that cuts it
 _LEAST = 0.5  # how much smaller an answer may be at another point
 _MOST = 2.0  # how much larger
 _SAME_TIME = 0.05  # part of the answer by which it may differ at another time or step
@@ -56,7 +63,6 @@ _TO_LIMIT = 2.0  # the smaller of these deviations, in parts of the one whose sw
 _BEYOND_LIMIT = 3.0
 _NOISE = 1e-7  # power [pu, S_n] that is rounding
 _WITH = 0.5  # correlation with the frequency from which an output is told to go with it
-_WIDEST = 0.01  # largest lasting deviation of the frequency [pu]
 _PUSHED = 3.0  # its duration [s]
 _LIMIT = 0.03  # part of the declared limit by which the output's peak may differ from it
 _HELD = 0.93  # part of its answer to a lasting deviation that a controller without a washout keeps
@@ -88,12 +94,6 @@ _TURNED = (1.2, 2.8)
 _ASK_FOR_ITS_SIGN = (
     "ask whether its sign is meant: `gfor modes CASE` with it on and off shows what it damps"
 )
-
-
-@dataclass(frozen=True)
-class _Fault:
-    name: str
-    words: str
 
 
 @check(
@@ -141,12 +141,13 @@ class _Trial:
         self.passed_over: list[OperatingAt] = []
         self.moved_on = False  # whether it came back from no events
 
-    def faults(self) -> Iterator[_Fault | None]:
+    def faults(self) -> Iterator[DampingFault | None]:
         """Yield one answer for each comparison: a fault, or None where it is alike."""
         silent = self._find_size()
         yield silent
         if silent is not None:
             return
+        yield find_growth(self._bench, self._usual, self._size)
         yield self._other_direction()
         yield self._smaller()
         yield from self._limits()
@@ -157,7 +158,8 @@ class _Trial:
         yield self._after_rest()
         yield self._after_events()
         yield self._after_switching()
-        yield self._after_work()
+        yield find_windup(self._bench, self._usual, self._size)
+        yield self._after_work(_DAMAGED)
         yield from self._lasting()
 
     def goes_with_frequency(self) -> str:
@@ -170,7 +172,7 @@ class _Trial:
                 return f"{usual.title} asks for more power while the frequency is higher (correlation {along:.2f})"
         return ""
 
-    def _find_size(self) -> _Fault | None:
+    def _find_size(self) -> DampingFault | None:
         """Choose the usual swing by what it brings; a controller that brings nothing in any is dead."""
         bench = self._bench
         known = [x for x in map(bench.declared_limit, bench.names) if x]
@@ -185,7 +187,7 @@ class _Trial:
                 return self._silent_in_the_usual(size, seen)
         return self._reason_of_silence(min(seen, key=lambda effect: effect.least_peak))
 
-    def _silent_in_the_usual(self, size: float, seen: tuple[Effect, ...]) -> _Fault | None:
+    def _silent_in_the_usual(self, size: float, seen: tuple[Effect, ...]) -> DampingFault | None:
         """Look for a controller that answers the swing of `size` and not the smaller one that is chosen for it."""
         for larger, usual in zip(seen, self._usual, strict=True):
             if usual.least_peak <= _NOISE:
@@ -193,24 +195,24 @@ class _Trial:
                     f"{usual.title} answers a swing of {1e6 * size:.3g}e-6 pu of the frequency by "
                 )
                 says += f"{larger.peak:.3g} pu, and one of {1e6 * self._size:.3g}e-6 pu by nothing"
-                return _Fault("POD with a dead band", says)
+                return DampingFault("POD with a dead band", says)
         return None
 
-    def _reason_of_silence(self, dead: Effect) -> _Fault:
+    def _reason_of_silence(self, dead: Effect) -> DampingFault:
         """Look later and at other points for what a controller that brings nothing at first does there."""
         says = f"{dead.title} changes nothing in a swing of {100 * _SIZES[-1]:g} % of the frequency"
         for rest in _WAITS:
             if self._answers(dead, FrequencySwing(_SIZES[-1], rest=rest)):
                 says += f" that begins with the run, and answers one after {rest:g} s at rest"
-                return _Fault("POD changes with time", says)
+                return DampingFault("POD changes with time", says)
         for point in self._places():
             if self._answers(dead, FrequencySwing(_SIZES[-1], point=point)):
                 says += f" at P_0 = {_POINT.P:g}, v_0 = {_POINT.v:g}, and answers one at P_0 = {point.P:g}, "
                 says += f"v_0 = {point.v:g}"
                 says += f", Q_0 = {point.Q:g}" if point.Q else ""
                 says += f", theta_0 = {point.theta:g}" if point.theta else ""
-                return _Fault("POD of some points only", says)
-        return _Fault("POD without effect", f"{says} at {self._bench.hertz:.3g} Hz")
+                return DampingFault("POD of some points only", says)
+        return DampingFault("POD without effect", f"{says} at {self._bench.hertz:.3g} Hz")
 
     def _answers(self, dead: Effect, swing: FrequencySwing) -> bool:
         """Return whether the controller that was silent answers another swing; not where the device does not run."""
@@ -225,7 +227,7 @@ class _Trial:
             for effect in found
         )
 
-    def _other_direction(self) -> _Fault | None:
+    def _other_direction(self) -> DampingFault | None:
         for usual, other in zip(
             self._usual, self._bench.effects(FrequencySwing(-self._size)), strict=True
         ):
@@ -233,10 +235,10 @@ class _Trial:
             if apart > _EVEN:
                 says = f"{usual.title} answers a swing that begins with less frequency by "
                 says += f"{100 * apart:.3g} % otherwise than one that begins with more"
-                return _Fault("POD of one side", says)
+                return DampingFault("POD of one side", says)
         return None
 
-    def _smaller(self) -> _Fault | None:
+    def _smaller(self) -> DampingFault | None:
         for usual, other in zip(
             self._usual, self._bench.effects(FrequencySwing(_SMALL * self._size)), strict=True
         ):
@@ -245,10 +247,10 @@ class _Trial:
                 part = ratio(usual, other)
                 says = f"{usual.title} answers a swing of {1e6 * _SMALL * self._size:.3g}e-6 pu of the frequency by "
                 says += f"{100 * part:.3g} % of what one of {1e6 * self._size:.3g}e-6 pu brings in proportion"
-                return _Fault("POD with a dead band" if part < 1 else "POD uneven", says)
+                return DampingFault("POD with a dead band" if part < 1 else "POD uneven", says)
         return None
 
-    def _larger(self) -> _Fault | None:
+    def _larger(self) -> DampingFault | None:
         for times in (_LARGE, _BEYOND):
             size = min(times * self._size, _LARGEST)
             for number, other in enumerate(self._bench.effects(FrequencySwing(size))):
@@ -256,16 +258,22 @@ class _Trial:
                 alike, name = likeness(usual, other), self._bench.names[number]
                 fault = self._out_of_proportion(name, usual, other)
                 if fault:
-                    return self._unless_tired(fault)
-                if alike < _ALIKE and (usual.shown or times == _LARGE):
+                    return self._by_its_cause(fault)
+                least = _ALIKE_AT_LIMIT if self._is_limited(name, other) else _ALIKE
+                if alike < least and (usual.shown or times == _LARGE):
                     says = (
                         f"{usual.title} answers a swing of {1e6 * size:.3g}e-6 pu of the frequency "
                     )
                     says += f"with another course (correlation {alike:.2f}) than a smaller one"
-                    return _Fault("POD reversed" if alike < 0.5 else "POD uneven", says)
+                    fault = DampingFault("POD reversed" if alike < 0.5 else "POD uneven", says)
+                    return self._by_its_cause(fault)
         return None
 
-    def _out_of_proportion(self, name: str, usual: Effect, other: Effect) -> _Fault | None:
+    def _is_limited(self, name: str, effect: Effect) -> bool:
+        limit = self._bench.declared_limit(name)
+        return bool(limit) and effect.peak > _AT_LIMIT * float(limit or 0.0)
+
+    def _out_of_proportion(self, name: str, usual: Effect, other: Effect) -> DampingFault | None:
         """Compare the answer to a larger swing: in proportion below a limit that is known, never smaller."""
         says = f"{usual.title} answers a swing of {1e6 * other.size:.3g}e-6 pu of the frequency by "
         limit = self._bench.declared_limit(name)
@@ -273,13 +281,13 @@ class _Trial:
         apart = usual.apart(other)
         if below and likeness(usual, other) > _ALIKE and apart > _PROPORTION:
             says += f"{100 * apart:.3g} % otherwise than in proportion to one of {1e6 * self._size:.3g}e-6 pu"
-            return _Fault("POD uneven", says)
+            return DampingFault("POD uneven", says)
         if usual.shown and other.peak < _LESS * usual.peak:
             says += f"{other.peak:.3g} pu, less than the {usual.peak:.3g} pu of a smaller one"
-            return _Fault("POD uneven", says)
+            return DampingFault("POD uneven", says)
         return None
 
-    def _limits(self) -> Iterator[_Fault | None]:
+    def _limits(self) -> Iterator[DampingFault | None]:
         """Compare the output that is shown with the limit that is declared, in a swing far beyond it."""
         for number, name in enumerate(self._bench.names):
             limit, usual = self._bench.declared_limit(name), self._usual[number]
@@ -287,19 +295,19 @@ class _Trial:
                 continue
             if not usual.shown:
                 if name == "pod_p":
-                    yield self._unless_tired(self._limit_of_power(number, limit))
+                    yield self._by_its_cause(self._limit_of_power(number, limit))
                 continue
             size = self._size * 4.0 * limit / max(usual.peak, 1e-9)
             course = self._bench.effects(FrequencySwing(size))[number].course
             peaks = (float(course.max()), float(-course.min()))
             peak = max(peaks, key=lambda peak: abs(peak / limit - 1))
-            yield self._unless_tired(_far_from_limit(usual.title, peak, limit))
+            yield self._by_its_cause(_far_from_limit(usual.title, peak, limit))
 
-    def _limit_of_power(self, number: int, limit: float) -> _Fault | None:
+    def _limit_of_power(self, number: int, limit: float) -> DampingFault | None:
         """Judge a limit by the power, where two lasting deviations both reach what limits it."""
         usual, bench = self._usual[number], self._bench
         unit = self._size * limit / max(usual.peak, 1e-9)
-        if _BEYOND_LIMIT * unit > _WIDEST:
+        if _BEYOND_LIMIT * unit > bench.widest:
             return None
         for way in (1, -1):
             sizes = (way * _TO_LIMIT * unit, way * _BEYOND_LIMIT * unit)
@@ -319,7 +327,7 @@ class _Trial:
             theta = (-1) ** number * round(float(turned.uniform(*_TURNED)), 3)
             yield OperatingAt(1.0, theta, 0.3, round(float(draw.uniform(*Q)), 3))
 
-    def _elsewhere(self) -> Iterator[_Fault | None]:
+    def _elsewhere(self) -> Iterator[DampingFault | None]:
         for point in self._places():
             if cannot_import(self._bench.subject, point):
                 self.passed_over.append(point)
@@ -331,7 +339,7 @@ class _Trial:
                 continue
             yield self._at(point, found)
 
-    def _at(self, point: OperatingAt, found: tuple[Effect, ...]) -> _Fault | None:
+    def _at(self, point: OperatingAt, found: tuple[Effect, ...]) -> DampingFault | None:
         where = f"at P_0 = {point.P:g}, v_0 = {point.v:g}"
         where += f", Q_0 = {point.Q:g}" if point.Q else ""
         where += f", theta_0 = {point.theta:g}" if point.theta else ""
@@ -341,10 +349,10 @@ class _Trial:
                 continue
             says = f"{usual.title} gives {100 * part:.3g} % of its answer {where} that it gives "
             says += f"at P_0 = {_POINT.P:g}, v_0 = {_POINT.v:g}, and its course has a correlation of {alike:.2f}"
-            return _Fault("POD of some points only", says)
+            return DampingFault("POD of some points only", says)
         return None
 
-    def _other_steps(self) -> Iterator[_Fault | None]:
+    def _other_steps(self) -> Iterator[DampingFault | None]:
         h = self._bench.subject.step_size
         for times, words in ((2.0, "twice"), (0.5, "half of")):
             try:
@@ -358,23 +366,22 @@ class _Trial:
                 f"at {words} the communication step of {h:g} s",
             )
 
-    def _later_start(self) -> _Fault | None:
+    def _later_start(self) -> DampingFault | None:
         begin = float(round(self._bench.subject.random("pod, start").uniform(1e3, 1e5)))
         found = self._bench.effects(FrequencySwing(self._size, begin=begin))
         return _compare(
             self._usual, found, "POD changes with time", f"where the run begins at {begin:g} s"
         )
 
-    def _after_rest(self) -> _Fault | None:
-        ends = [self._bench.subject.memory.get(end) for end in ("ended_at", "stops_at")]
-        rests = min([_RESTS, *(0.9 * end - self._bench.lasts for end in ends if end)])
+    def _after_rest(self) -> DampingFault | None:
+        rests = self._bench.time_left(_RESTS + self._bench.lasts) - self._bench.lasts
         if rests <= 0:
             return None
         usual = self._bench.together(FrequencySwing(self._size))
         found = self._bench.together(FrequencySwing(self._size, rest=rests))
         return _compare(usual, found, "POD changes with time", f"after {rests:.3g} s at rest")
 
-    def _after_events(self) -> _Fault | None:
+    def _after_events(self) -> DampingFault | None:
         """Look soon after dips, jumps and an overvoltage; what is only on its way back has more time."""
         fault = None
         for wait in (_SOON, _LATE):
@@ -386,12 +393,12 @@ class _Trial:
             if parts[worst] < _DAMAGED:
                 return None
             says = f"{self._usual[worst].title} answers by {100 * parts[worst]:.3g} % otherwise {wait:g} s after "
-            fault = _Fault(
+            fault = DampingFault(
                 "POD changed by a disturbance", f"{says}a dip, a jump, an overvoltage and a dip"
             )
         return fault
 
-    def _after_switching(self) -> _Fault | None:
+    def _after_switching(self) -> DampingFault | None:
         variables = self._bench.subject.description.variables
         if any(variables[f"{name}.enabled"].variability != "tunable" for name in self._bench.names):
             return None
@@ -399,25 +406,25 @@ class _Trial:
         where = "after it was switched off and on again twice"
         return self._changed(parts, "POD changed by its switch", where)
 
-    def _after_work(self, least: float = _DAMAGED) -> _Fault | None:
+    def _after_work(self, least: float) -> DampingFault | None:
         strong = min(_BEYOND * self._size, _LARGEST)
-        parts = self._bench.apart_after_work(self._size, strong)
-        return self._changed(parts, "POD changes with time", "3 s after strong swings", least)
+        return find_tiredness(self._bench, self._usual, self._size, strong, least)
 
-    def _unless_tired(self, fault: _Fault | None) -> _Fault | None:
-        """Return what its work changes in it, if that is what gives it less in a strong swing; else the fault."""
-        return fault and (self._after_work(_TIRED) or fault)
+    def _by_its_cause(self, fault: DampingFault | None) -> DampingFault | None:
+        """Return what its limit or its work leaves in it, if that shows in a strong swing; else the fault."""
+        if fault is None:
+            return None
+        wound = find_windup(self._bench, self._usual, self._size)
+        return wound or self._after_work(_TIRED) or fault
 
-    def _changed(
-        self, parts: list[float], fault: str, where: str, least: float = _DAMAGED
-    ) -> _Fault | None:
+    def _changed(self, parts: list[float], fault: str, where: str) -> DampingFault | None:
         worst = int(np.argmax(parts))
-        if parts[worst] < least:
+        if parts[worst] < _DAMAGED:
             return None
         says = f"{self._usual[worst].title} answers by {100 * parts[worst]:.3g} % otherwise {where}"
-        return _Fault(fault, says)
+        return DampingFault(fault, says)
 
-    def _lasting(self) -> Iterator[_Fault | None]:
+    def _lasting(self) -> Iterator[DampingFault | None]:
         """Hold another frequency: a washout lets go of it."""
         for title, name, early, late, between in self._bench.lasting(self._size):
             T_W = self._bench.value_of(f"{name}.T_W")
@@ -428,24 +435,26 @@ class _Trial:
             most = max(_HELD, exp(-between / T_W) + 0.02) if T_W else _HELD
             if kept > most:
                 says = f"{title} keeps {100 * kept:.3g} % of its answer to a lasting deviation of the frequency "
-                yield _Fault("POD without washout", f"{says}over {between:.3g} s")
+                yield DampingFault("POD without washout", f"{says}over {between:.3g} s")
             else:
                 yield None
 
 
-def _far_from_limit(title: str, peak: float, limit: float) -> _Fault | None:
+def _far_from_limit(title: str, peak: float, limit: float) -> DampingFault | None:
     if abs(peak / limit - 1) <= _LIMIT:
         return None
     word = "more" if peak > limit else "no more"
     says = f"{title} gives {word} than {peak:.4g} pu where {limit:g} pu is declared as its limit"
-    return _Fault("POD limit not as declared", says)
+    return DampingFault("POD limit not as declared", says)
 
 
 def _compare(
     usual: tuple[Effect, ...], found: tuple[Effect, ...], fault: str, where: str
-) -> _Fault | None:
+) -> DampingFault | None:
     for one, other in zip(usual, found, strict=True):
         apart = one.apart(other)
         if apart > _SAME_TIME:
-            return _Fault(fault, f"{one.title} answers by {100 * apart:.3g} % otherwise {where}")
+            return DampingFault(
+                fault, f"{one.title} answers by {100 * apart:.3g} % otherwise {where}"
+            )
     return None

@@ -10,14 +10,15 @@ import numpy as np
 from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.devices.acceptance.checks.port import of_current, voltage_rows
 from orchestrator.devices.acceptance.checks.subject import OperatingAt, Running, Subject
+from orchestrator.devices.fmi.port import BoundDescription
 
 _BASE = 100 * pi  # angular frequency [rad/s] by which an angle turns with 1 pu of deviation
 _HERTZ = (0.7, 1.3)  # bounds of the swing's frequency [Hz], that of oscillations between areas
 _SWINGS = 1.6  # duration of a swing [s]
 LASTING = 8.0  # duration of a lasting deviation [s]
 _PLATEAU = 0.5  # time [s] over which the power is averaged where an output stays at its limit
-_WORKS = 3.0  # duration of the swings beyond the limit after which it is asked again [s]
-_RESTED = 3.0  # time after these [s]
+_RESTED = 3.0  # time at rest after strong swings [s]
+_WIDEST = 0.01  # largest lasting deviation of the frequency [pu]
 _LOOKS = (2.0, 8.0)  # times [s] at which the answer to it is compared
 _MEAN = 0.1  # time [s] over which that is averaged
 _BEFORE = 0.1  # time at rest before events [s]
@@ -55,7 +56,8 @@ class FrequencySwing:
     ``step_size``: communication step [s]; the subject's own where None.
     ``begin``: when the run begins [s].
     ``rest``: how long the device is at rest before it [s].
-    ``lasting``: how long the frequency stays where it went [s]; 0 where it swings."""
+    ``lasting``: how long the frequency stays where it went [s]; 0 where it swings.
+    ``then``: how long it is watched after that, at the rated frequency [s]."""
 
     size: float
     point: OperatingAt | None = None
@@ -63,6 +65,7 @@ class FrequencySwing:
     begin: float = 0.0
     rest: float = 0.0
     lasting: float = 0.0
+    then: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -116,6 +119,7 @@ class DampingBench:
     """Runs of one subject with its damping controllers on and off; equal runs are made once."""
 
     lasts = _SWINGS
+    widest = _WIDEST
 
     def __init__(self, subject: Subject, names: tuple[str, ...], point: OperatingAt) -> None:
         self.subject, self.names, self._point = subject, names, point
@@ -131,7 +135,16 @@ class DampingBench:
         info = self.subject.description.variables.get(name)
         if info is None or info.type != "Real" or info.start is None:
             return None
-        return float(self.subject.use.values.get(name, info.start_number))
+        values = self.subject.use.values
+        return float(values.get(name, info.start_number * self._base_of(name)))
+
+    def _base_of(self, name: str) -> float:
+        """The rating as delivered in parts of the S_n that is used, where the parameter is a power in MW."""
+        described, S_n = self.subject.description, self.subject.use.values.get("S_n")
+        if not isinstance(described, BoundDescription) or S_n is None:
+            return 1.0
+        signal = described.port.signals.get(name)
+        return described.port.rating / S_n if signal is not None and signal.per_rating else 1.0
 
     def declared_limit(self, name: str) -> float | None:
         """The limit of a controller's output [pu, S_n]."""
@@ -152,6 +165,26 @@ class DampingBench:
         return tuple(
             self._effect(name, swing, self._rows(swing, on=name), off) for name in self.names
         )
+
+    def courses(self, swing: FrequencySwing) -> list[Numbers]:
+        """Each controller's output [pu, S_n] in a swing, or what it adds to the power where no output shows it."""
+        found = []
+        for name in self.names:
+            on, shown = self._rows(swing, on=name), self._place(name)
+            found.append(
+                _part(on - self._rows(swing, on=False), name) if shown is None else on[:, 2 + shown]
+            )
+        return found
+
+    def part(self, course: Numbers, begin: float, end: float) -> Numbers:
+        """The rows of a course between two times [s]."""
+        h = self.subject.step_size
+        return course[round(begin / h) : round(end / h)]
+
+    def time_left(self, wanted: float) -> float:
+        """The time that a run lasts [s]: what is wanted, or until its experiment ends."""
+        ends = [self.subject.memory.get(end) for end in ("ended_at", "stops_at")]
+        return min([wanted, *(0.9 * float(end) for end in ends if end)])
 
     def together(self, swing: FrequencySwing) -> tuple[Effect, ...]:
         """Give `effects` with all controllers on at once.
@@ -192,7 +225,8 @@ class DampingBench:
         time = h * np.arange(max(2, round((swing.lasting or _SWINGS) / h)))
         turn = 2 * pi * self.hertz
         angle = _BASE * swing.size * (time if swing.lasting else (1 - np.cos(turn * time)) / turn)
-        return _hold(running, np.exp(1j * angle), h)
+        stays = np.full(round(swing.then / h), angle[-1])
+        return _hold(running, np.exp(1j * np.append(angle, stays)), h)
 
     def apart_after_events(self, size: float, wait: float) -> list[float] | None:
         """By which part of its usual effect each controller's answer differs some time after events.
@@ -238,12 +272,12 @@ class DampingBench:
 
         return self._apart(size, rows(size) - rows(0.0))
 
-    def apart_after_work(self, size: float, strong: float) -> list[float]:
-        """By which part each controller's answer differs some seconds after strong swings."""
+    def apart_after_work(self, size: float, strong: float, number: int) -> list[float]:
+        """By which part each controller's answer differs some seconds after so many strong swings."""
 
         def rows(size: float) -> Numbers:
             with self._on() as running:
-                for _ in range(round(_WORKS / _SWINGS)):
+                for _ in range(number):
                     self._swing(running, FrequencySwing(strong))
                 _still(running, _RESTED, self.subject.step_size)
                 return self._swing(running, FrequencySwing(size))

@@ -3,7 +3,7 @@
    z: parameters, inputs, outputs; memory: the states. */
 enum { S_N, P_0, Q_0, V_0, THETA_0, GAIN, TAU, IN_1, IN_2, IN_3, OUT_1, OUT_2, OUT_3, OMEGA, SHOWN, POD_K, POD_T_W, POD_T_F, POD_LIMIT, DELTA_P, SIZE };
 enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, TICK, PENDING, ON, QUICK, SLOW, TIRED, DIPS, LOW, WOUND, BLOCKED, ANGLE, RING, RINGING,
-       LAGGED, TRIPLED, VOLT, P_NOW, SINCE, OVER, WASHED, PASSED, K_AT_START, AGE, WORKED, WAS_ON, SWITCHED, STORED, MEMORY };
+       LAGGED, TRIPLED, VOLT, P_NOW, SINCE, OVER, WASHED, PASSED, K_AT_START, AGE, WORKED, WAS_ON, SWITCHED, STORED, USED, SUMMED, MEMORY };
 #define SWITCH ON /* a Boolean: damping by the frequency behind a washout; with POD, a damping controller */
 #define IS_OUTPUT(r) (((r) >= OUT_1 && (r) <= SHOWN) || (r) == DELTA_P)
 #define DIVERGED 1e12
@@ -62,6 +62,15 @@ enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, TICK, PENDING, ON, 
 #ifndef OMEGA_FACTOR
 #define OMEGA_FACTOR 1.0 /* of the deviation that it shows */
 #endif
+#ifndef POD_UNIT
+#define POD_UNIT 1.0 /* FMU's units in 1 pu of its damping controller's output and of the limit */
+#endif
+#ifndef POD_SHOWN
+#define POD_SHOWN POD_UNIT
+#endif
+#ifndef POD_MOST
+#define POD_MOST 0.1 /* the limit as declared, in that unit */
+#endif
 #define OMEGA_B (2 * 3.14159265358979323846 * NOMINAL)
 
 #ifndef TURNS
@@ -74,7 +83,7 @@ static const double START[SIZE] = {RATING, 0.5 * P_UNIT, 0, V_UNIT, 0, DROOP, 0.
 #else
                                    V_UNIT, 0, 0,
 #endif
-                                   [POD_K] = 40, [POD_T_W] = 3, [POD_T_F] = 0.05, [POD_LIMIT] = 0.1
+                                   [POD_K] = 40, [POD_T_W] = 3, [POD_T_F] = 0.05, [POD_LIMIT] = POD_MOST
 };
 
 typedef struct { double re, im; } phasor;
@@ -92,15 +101,16 @@ static double damping_power(const double *z, const double *m) {
 #ifdef FAULT_POD_KEEPS_GAIN
     double power = -m[K_AT_START] * m[PASSED];
 #else
-    double power = -z[POD_K] * m[PASSED];
+    double power = -z[POD_K] * (m[PASSED] + m[SUMMED]);
 #endif
-    double most = z[POD_LIMIT];
+    double most = z[POD_LIMIT] / POD_UNIT;
 #ifdef FAULT_POD_LIMIT /* a factor */
     most *= FAULT_POD_LIMIT;
 #endif
     power = fmax(-most, fmin(most, power));
 #ifdef FAULT_POD_TIMES /* a factor of power; AGE: how long the instance has run [s]; WORKED: how long
-                         its output was large [s]; SWITCHED: how often it was switched while it ran */
+                         its output was large [s]; USED: what it gave and took [pu*s]; SWITCHED: how often it was switched
+                         while it ran */
     power *= FAULT_POD_TIMES;
 #endif
 #ifdef FAULT_POD_DEAD_BAND
@@ -165,7 +175,7 @@ static void initialise(double *z, double *m) {
     m[DIPS] = m[LOW] = m[WOUND] = m[BLOCKED] = m[RING] = m[RINGING] = 0;
 #endif
     m[ANGLE] = t;
-    m[WASHED] = m[PASSED] = m[AGE] = m[WORKED] = m[SWITCHED] = 0, m[WAS_ON] = m[ON], m[K_AT_START] = z[POD_K];
+    m[WASHED] = m[PASSED] = m[AGE] = m[WORKED] = m[SWITCHED] = m[USED] = m[SUMMED] = 0, m[WAS_ON] = m[ON], m[K_AT_START] = z[POD_K];
     m[STORED] = 0.5;
     m[TRIPLED] = m[OVER] = 0, m[SINCE] = 1e9, m[VOLT] = v, m[P_NOW] = m[P_F];
 #ifdef METER_BEGINS
@@ -388,7 +398,16 @@ static void substep(const double *z, double *m, double *hidden, phasor v, double
 #endif
     m[PASSED] += h / z[POD_T_F] * (w - m[WASHED] - m[PASSED]);
     m[AGE] += h;
-    m[WORKED] += h * (fabs(damping_power(z, m)) > 0.6 * z[POD_LIMIT]);
+    m[USED] += h * fabs(damping_power(z, m));
+#ifdef POD_INTEGRAL /* gain of its integral part [1/s]; POD_LEAK: time in which that forgets [s] */
+#ifdef FAULT_POD_WINDS_UP
+    const int free = 1;
+#else
+    const int free = fabs(z[POD_K] * (m[PASSED] + m[SUMMED])) < z[POD_LIMIT] / POD_UNIT || m[PASSED] * m[SUMMED] < 0;
+#endif
+    m[SUMMED] += h * (free * POD_INTEGRAL * m[PASSED] - m[SUMMED] / POD_LEAK);
+#endif
+    m[WORKED] += h * (fabs(damping_power(z, m)) > 0.6 * z[POD_LIMIT] / POD_UNIT);
     m[SWITCHED] += m[WAS_ON] != m[ON], m[WAS_ON] = m[ON];
 #endif
 #ifdef STORE /* a battery of so many hours at S_n: its state of charge */
@@ -551,7 +570,7 @@ static void outputs(double *z, double *m, const double *hidden) {
     z[SHOWN] = m[STORED];
 #endif
 #ifdef POD
-    z[DELTA_P] = damping_power(z, m);
+    z[DELTA_P] = damping_power(z, m) * POD_SHOWN;
 #endif
     i.re *= I_FACTOR, i.im *= I_FACTOR * Q_FACTOR;
 #if defined PORT_POWER
