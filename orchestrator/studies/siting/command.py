@@ -1,6 +1,7 @@
 """Places of a device: what users may ask, what they get, and what ``gfor site`` prints."""
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 from rich.console import RenderableType
 from rich.markup import escape
@@ -8,12 +9,14 @@ from rich.markup import escape
 from orchestrator.cases.case import Case
 from orchestrator.core.errors import NOT_MET
 from orchestrator.studies.points.study import StudyAtOnce
-from orchestrator.studies.siting.machine_view import MachineSiting, machine_table
+from orchestrator.studies.siting.machine_view import MachineSiting
 from orchestrator.studies.siting.machines import find_machines
+from orchestrator.studies.siting.place_ranking import PlaceRanking
 from orchestrator.studies.siting.study import REGULATOR, SiteRequest, find_sites
-from orchestrator.studies.siting.view import Siting, ranking_table
+from orchestrator.studies.siting.view import Siting
 
-Found = Siting | MachineSiting
+Found = PlaceRanking[Any]
+"""Buses or machines."""
 
 
 def _computed(case: Case, request: SiteRequest, report: Callable[[int, int], None]) -> Found:
@@ -26,16 +29,13 @@ def _computed(case: Case, request: SiteRequest, report: Callable[[int, int], Non
 def _parts(found: Found) -> Iterator[RenderableType]:
     yield from map(escape, (found.answer, *found.remarks))
     yield ""
-    if isinstance(found, MachineSiting):
-        yield machine_table(found.result)
-    else:
-        yield ranking_table(found.result)
+    yield found.best_table()
     yield ""
 
 
 def _warnings(found: Found) -> list[str]:
-    modes = found.result.found if isinstance(found, MachineSiting) else found.result.intact.found
-    return [f"scenario {found.result.prepared.name!r}: {text}" for text in modes.unasked]
+    name = found.result.prepared.name
+    return [f"scenario {name!r}: {text}" for text in found.without_device.unasked]
 
 
 STUDY = StudyAtOnce(

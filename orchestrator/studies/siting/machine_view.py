@@ -3,25 +3,19 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from html import escape
-from pathlib import Path
 from typing import Any
 
-from rich.table import Table
-
 from orchestrator.core.errors import few
-from orchestrator.core.late import pd
-from orchestrator.core.safe_files import made_folder, write_text
-from orchestrator.output.report.html.elements import document, table
-from orchestrator.output.report.notebook import page
-from orchestrator.output.report.tables import make_table
-from orchestrator.output.results.lock import held
+from orchestrator.output.report.html.elements import document
+from orchestrator.output.report.table import ShownTable
 from orchestrator.output.results.mode_json import eigenvalue_json
-from orchestrator.output.results.staging import new_run_id, staged
-from orchestrator.output.results.storage import save_json, save_table
+from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.points.code import code_hash
 from orchestrator.studies.siting.confirmation import Confirmation
 from orchestrator.studies.siting.machines import CONTROLLER, PART, MachineSites
+from orchestrator.studies.siting.place_ranking import PlaceRanking
 from orchestrator.studies.siting.view import (
     confirmation_json,
     end_of_search,
@@ -34,7 +28,7 @@ _SHOWN = 12  # machines in a table, best first
 _NAMED = 4  # things in a sentence; the others are counted
 
 
-class MachineSiting:
+class MachineSiting(PlaceRanking[MachineSites]):
     """How far a POD at each machine's voltage regulator moves the poorly damped modes, best machine first.
 
     Attributes
@@ -43,13 +37,9 @@ class MachineSiting:
         All that was computed.
     """
 
-    def __init__(self, result: MachineSites) -> None:
-        self.result = result
-
-    @property
-    def ranking(self) -> tuple[str, ...]:
-        """All machines with a voltage regulator, best first."""
-        return self.result.ranking
+    json_name = "machines.json"
+    table_name = "machines.csv"
+    page_name = "machines.html"
 
     @property
     def answer(self) -> str:
@@ -62,33 +52,26 @@ class MachineSiting:
         return [*sureness(self.result), *remarks(self.result)]
 
     @property
-    def agrees(self) -> bool:
-        """Return whether the coupled FMUs confirm every machine that was tried."""
-        return self.result.agrees
-
-    def table(self) -> pd.DataFrame:
-        """One row for each machine and mode; columns as in ``machines.csv``."""
-        return pd.DataFrame(rows(self.result))
+    def without_device(self) -> ModesResult:
+        return self.result.found
 
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor site --json`` prints, as JSON's types."""
         return as_json(self.result)
 
-    def save(self, folder: str | Path) -> list[Path]:
-        """Write ``machines.json``, ``machines.csv`` and the page ``machines.html`` into a folder."""
-        place = made_folder(folder, "folder")
-        with held(place), staged(place, new_run_id()) as staging:
-            save_json(self.as_json(), staging / "machines.json")
-            save_table(rows(self.result), staging / "machines.csv")
-            write_text(staging / "machines.html", _page(self.result))
-        return [place / f"machines.{end}" for end in ("json", "csv", "html")]
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each machine and mode, best machine first, as ``machines.csv`` has them."""
+        return rows(self.result)
 
-    def __repr__(self) -> str:
-        return f"<MachineSiting in {self.result.case.name}: {self.answer}>"
+    def best_table(self) -> ShownTable:
+        title = f"{UNIT}, and the angle to turn to 180°; best first"
+        return _table_of(self.result, title, self.result.ranking[:_SHOWN])
 
-    def _repr_html_(self) -> str:
-        title = f"Machines of {self.result.case.name} as places of a POD"
-        return page(title, [self.answer, *self.remarks], self.table())
+    def page_title(self) -> str:
+        return f"Machines of {self.result.case.name} as places of a POD"
+
+    def page_text(self) -> str:
+        return _page(self.result)
 
 
 def answer(result: MachineSites) -> str:
@@ -201,10 +184,9 @@ def rows(result: MachineSites) -> list[dict[str, Any]]:
     ]
 
 
-def machine_table(result: MachineSites) -> Table:
-    cells = [[name, *_cells(result, name)] for name in result.ranking[:_SHOWN]]
-    title = f"{UNIT}, and the angle to turn to 180°; best first"
-    return make_table(title, "Machine", *_headings(result), rows=cells)
+def _table_of(result: MachineSites, title: str, machines: Sequence[str]) -> ShownTable:
+    cells = [[name, *_cells(result, name)] for name in machines]
+    return ShownTable(title, ["Machine", *_headings(result)], cells)
 
 
 def _headings(result: MachineSites) -> list[str]:
@@ -226,7 +208,6 @@ def _page(result: MachineSites) -> str:
     lines = "".join(f"<li>{escape(text)}</li>" for text in (*sureness(result), *remarks(result)))
     shade = "good" if result.agrees and result.confirmations else "soft"
     findings = f'<div class="findings"><p class="{shade}">{escape(answer(result))}</p><ul>{lines}</ul></div>'
-    cells = [[escape(name), *_cells(result, name)] for name in result.ranking]
-    content = [("All machines", table(UNIT, ["Machine", *_headings(result)], cells))]
+    content = [("All machines", _table_of(result, UNIT, result.ranking).html())]
     kind, names = f"{result.prepared.title}; code {code_hash()[:12]}", result.prepared.names
     return document(title, kind, findings, content, names=names)

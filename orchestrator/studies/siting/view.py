@@ -9,21 +9,17 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.core.errors import few
-from orchestrator.core.late import pd
-from orchestrator.core.safe_files import made_folder, write_text
 from orchestrator.core.truth import all_true
 from orchestrator.linear.spectra.modes import Mode, damping_percent
 from orchestrator.output.report.html.elements import SHADES, Figures, damping, document, table
 from orchestrator.output.report.html.network_map import network_map
-from orchestrator.output.report.notebook import page
 from orchestrator.output.report.table import ShownTable
 from orchestrator.output.report.tables import share_text
-from orchestrator.output.results.lock import held
 from orchestrator.output.results.mode_json import eigenvalue_json
-from orchestrator.output.results.staging import new_run_id, staged
-from orchestrator.output.results.storage import save_json, save_table
+from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.points.code import code_hash
 from orchestrator.studies.siting.confirmation import Confirmation
+from orchestrator.studies.siting.place_ranking import PlaceRanking
 from orchestrator.studies.siting.placing import ACTIVE, OURS_MVA, REACTIVE
 from orchestrator.studies.siting.residues import SeenMode, Situation
 from orchestrator.studies.siting.study import DEVICE, DROOP, SiteResult, SupportShift
@@ -45,7 +41,7 @@ _SHOWN = 12  # buses in a table, best first
 _NAMED = 4  # things in a sentence; the others are counted
 
 
-class Siting:
+class Siting(PlaceRanking[SiteResult]):
     """How far a device at each bus moves the poorly damped modes, best bus first.
 
     Attributes
@@ -54,13 +50,9 @@ class Siting:
         All that was computed.
     """
 
-    def __init__(self, result: SiteResult) -> None:
-        self.result = result
-
-    @property
-    def ranking(self) -> tuple[str, ...]:
-        """All buses, best first."""
-        return self.result.ranking
+    json_name = "site.json"
+    table_name = "buses.csv"
+    page_name = "site.html"
 
     @property
     def answer(self) -> str:
@@ -73,34 +65,25 @@ class Siting:
         return [*sureness(self.result), *remarks(self.result)]
 
     @property
-    def agrees(self) -> bool:
-        """Return whether the coupled FMUs confirm every place that was tried."""
-        return self.result.agrees
-
-    def table(self) -> pd.DataFrame:
-        """One row for each bus and mode; columns as in ``buses.csv``."""
-        return pd.DataFrame(rows(self.result))
+    def without_device(self) -> ModesResult:
+        return self.result.intact.found
 
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor site --json`` prints, as JSON's types."""
         return as_json(self.result)
 
-    def save(self, folder: str | Path) -> list[Path]:
-        """Write ``site.json``, ``buses.csv`` and the page ``site.html``, which has a map, into a folder."""
-        place = made_folder(folder, "folder")
-        with held(place), staged(place, new_run_id()) as staging:
-            save_json(self.as_json(), staging / "site.json")
-            save_table(rows(self.result), staging / "buses.csv")
-            write_text(staging / "site.html", _page(self.result))
-        return [place / name for name in ("site.json", "buses.csv", "site.html")]
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each bus and mode, best bus first, as ``buses.csv`` has them."""
+        return rows(self.result)
 
-    def __repr__(self) -> str:
-        return f"<Siting in {self.result.case.name}: {self.answer}>"
+    def best_table(self) -> ShownTable:
+        return ranking_table(self.result)
 
-    def _repr_html_(self) -> str:
-        return page(
-            f"Siting in {self.result.case.name}", [self.answer, *self.remarks], self.table()
-        )
+    def page_title(self) -> str:
+        return f"Siting in {self.result.case.name}"
+
+    def page_text(self) -> str:
+        return _page(self.result)
 
 
 def unit(result: SiteResult, times: str = "1") -> str:
