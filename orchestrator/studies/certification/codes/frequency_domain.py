@@ -8,13 +8,11 @@ from typing import Any
 import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers
-from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.output.report.plot_style import STYLE, colour, save_figure
 from orchestrator.output.results.storage import save_json, save_table
-from orchestrator.studies.black_box.frequency_response import Excitation, FrequencyResponse, measure
-from orchestrator.studies.black_box.port import bench_at
-from orchestrator.studies.certification.codes.bench_point import STEP
-from orchestrator.studies.certification.codes.programme import RATING_MVA, jumps
+from orchestrator.studies.black_box.frequency_response import Excitation, FrequencyResponse
+from orchestrator.studies.certification.codes.programme import jumps
+from orchestrator.studies.certification.codes.response_at_point import point_values, response_at
 from orchestrator.studies.certification.request import CertificationRequest
 from orchestrator.studies.immittance.forms import powers_over, rows_of
 
@@ -99,11 +97,9 @@ def measure_stiffness(
     request: CertificationRequest, f_n: float, report: Callable[[str], None]
 ) -> Stiffness:
     """Measure a converter at an ideal bus, at half of its rating and 1 pu."""
-    description = bound_fmu(request.fmu, request.binding)
-    given = {"S_n": RATING_MVA, "P_0": POWER, "Q_0": 0.0, "v_0": 1.0, "theta_0": 0.0, "f_n": f_n}
-    known = {name: value for name, value in given.items() if name in description.variables}
-    bench = bench_at(description, known | dict(request.values), STEP)
-    return stiffness(measure(bench, EXCITATION, report), complex(*bench.rest), f_n)
+    values = point_values(POWER, 0.0, 1.0, f_n)
+    response, voltage = response_at(request, values, EXCITATION, report, can_be_moved=True)
+    return stiffness(response, voltage, f_n)
 
 
 def figures_of_stiffness(found: Stiffness, model: str, f_n: float) -> dict[str, Any]:

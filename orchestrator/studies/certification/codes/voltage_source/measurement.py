@@ -1,20 +1,14 @@
 """Measurement of a device's admittance at an ideal bus, at each operating point."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from orchestrator.core.errors import AnalysisError
-from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.studies.black_box.fitting import bands_of, passivity, require_fitting
-from orchestrator.studies.black_box.frequency_response import Excitation, FrequencyResponse, measure
-from orchestrator.studies.black_box.port import bench_at
-from orchestrator.studies.certification.codes.bench_point import STEP
-from orchestrator.studies.certification.codes.frequency_domain import (
-    stiffness,
-)
-from orchestrator.studies.certification.codes.programme import RATING_MVA
+from orchestrator.studies.black_box.frequency_response import Excitation, FrequencyResponse
+from orchestrator.studies.certification.codes.frequency_domain import stiffness
+from orchestrator.studies.certification.codes.response_at_point import point_values, response_at
 from orchestrator.studies.certification.codes.voltage_source.figures import (
     SLOW,
     TOLD,
@@ -62,19 +56,9 @@ def _measured(
     point: ScannedPoint,
     slowly: bool,
 ) -> AtPoint:
-    description = bound_fmu(request.fmu, request.binding)
-    given: Mapping[str, Any] = {
-        "S_n": RATING_MVA,
-        "P_0": point.active,
-        "Q_0": point.reactive,
-        "v_0": point.voltage,
-        "theta_0": 0.0,
-        "f_n": f_n,
-    }
-    known = {name: value for name, value in given.items() if name in description.variables}
-    bench = bench_at(description, dict(request.values) | known, STEP)
-    response = measure(bench, WHOLE if slowly else FAST, report)
-    return at_point(point, request.fmu.name, response, complex(*bench.rest), f_n=f_n)
+    values = point_values(point.active, point.reactive, point.voltage, f_n)
+    response, voltage = response_at(request, values, WHOLE if slowly else FAST, report)
+    return at_point(point, request.fmu.name, response, voltage, f_n=f_n)
 
 
 def at_point(
