@@ -1,8 +1,16 @@
 """Two folders of outputs are compared to the last digit, key, row and line, but for differences that are named."""
 
 import json
+from zipfile import ZipFile
 
-from tests.benchmarks.outputs import compare
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.io import savemat
+
+from orchestrator.face import cli
+from tests.benchmarks import outputs
+from tests.benchmarks.outputs import COMMANDS, compare
 
 
 def _folders(tmp_path, before, after):
@@ -51,3 +59,55 @@ def test_a_difference_that_is_named_and_the_speed_of_a_run_are_left_out(tmp_path
     folders = _folders(tmp_path, before, after)
     assert compare(*folders, ["a.json: .title"]) == []
     assert len(compare(*folders, [])) == 1
+
+
+def test_binary_files_differ_by_their_content_and_not_by_the_time_of_their_writing(tmp_path):
+    folders = [tmp_path / "before", tmp_path / "after"]
+    for k, folder in enumerate(folders):
+        folder.mkdir()
+        values = np.array([1.0, 2.0 + k * 1e-15])
+        np.savez(folder / "a.npz", same=np.ones(2), other=values)
+        savemat(folder / "b.mat", {"same": np.ones(2), "other": values})
+        xr.Dataset({"other": ("x", values, {"unit": "pu"[: 2 - k]})}).to_netcdf(folder / "c.nc")
+        with ZipFile(folder / "d.ssp", "w") as archive:
+            archive.writestr(f"resources/{k}.bin", "")
+            archive.writestr("system.ssd", f"<same/>\n<gain value='{k}'/>\n")
+    assert [line.rsplit(": ", 1)[0] for line in compare(*folders, [])] == [
+        "a.npz: other",
+        "b.mat: other",
+        "c.nc: other",
+        "c.nc: other.unit",
+        "d.ssp: files",
+        "d.ssp: system.ssd line 1",
+    ]
+
+
+def test_a_command_that_is_refused_by_mistake_is_named(tmp_path, monkeypatch):
+    """Two folders in which a command was refused are alike, and show nothing."""
+    monkeypatch.setattr(outputs, "COMMANDS", {"wrong": "no-such-command"})
+    (line,) = outputs.write(tmp_path, ["wrong"])
+    assert line.startswith("wrong: exit code 2: ")
+    assert "no-such-command" in line
+
+
+def test_a_folder_with_kept_points_is_refused(tmp_path):
+    (tmp_path / "points").mkdir()
+    with pytest.raises(SystemExit, match="give a new folder"):
+        outputs.write(tmp_path, [])
+
+
+def test_code_of_another_tree_than_the_one_asked_for_is_refused(tmp_path):
+    with pytest.raises(SystemExit, match="Python takes orchestrator from"):
+        outputs.write(tmp_path / "out", [], tmp_path)
+
+
+def test_every_command_that_computes_is_compared():
+    """A study, ours or a colleague's, is a command; those of the list show nothing that is computed or need a peer."""
+    shown = {" ".join(words.split()[:count]) for words in COMMANDS.values() for count in (1, 2)}
+    assert set(cli.COMMANDS) - shown == {
+        "explore",
+        "export dll",
+        "master federate",
+        "mcp",
+        "sign",
+    }
