@@ -20,7 +20,7 @@ from orchestrator.face.explore.diagram import diagram
 from orchestrator.output.report import power_flow
 from orchestrator.studies.modes.modes import compute_modes
 from tests.cases.networks.psse import raw, records
-from tests.cases.networks.psse.test_rawx import network, table
+from tests.cases.networks.psse.rawx_texts import network, rawx, table
 from tests.cases.networks.test_element_names import _CASE, MPC
 
 TUTORIAL = Path(__file__).parents[3] / ".docs" / "tutorials" / "psse"
@@ -108,7 +108,7 @@ def test_rawx_names_its_regions(read):
     tables["subnode"] = table(node, [[2, 1, "N1", 8, 1, None, None]])
     end = "isub inode type eqid ibus jbus kbus"
     tables["subterm"] = table(end, [[1, 1, "M", "8", 8, None, None]])
-    assert read(json.dumps({"network": tables}), "nine.rawx")[8] == EAST
+    assert read(rawx(tables), "nine.rawx")[8] == EAST
 
 
 def test_a_word_in_the_place_of_a_number_tells_no_region(read):

@@ -1,5 +1,7 @@
 """RAW files of the WSCC 9-bus system, written for these tests in each revision."""
 
+from orchestrator.cases.networks.psse.raw import read_raw
+
 BUSES = {1: (16.5, 3, 1.04), 2: (18.0, 2, 1.025), 3: (13.8, 2, 1.025)} | dict.fromkeys(
     range(4, 10), (230.0, 1, 1.0)
 )
@@ -84,7 +86,20 @@ def raw(revision=33, found=None, named=True):
             "GENERAL, THRSHZ=0.0001",
             f"0 / END OF SYSTEM-WIDE DATA, BEGIN {order[0]} DATA",
         ]
-    for section, following in zip(order, [*order[1:], ""], strict=True):
+    lines += in_sections({section: found[section] for section in order}, named=named)
+    return "\n".join([*lines, "Q", ""])
+
+
+def in_sections(found, *, named=True):
+    """Lines of sections, each with the line that ends it; ``named``: whether that says what begins."""
+    lines = []
+    for section, following in zip(found, [*list(found)[1:], ""], strict=True):
         begin = f", BEGIN {following} DATA" if following else ""
         lines += [*found[section], f"0 / END OF {section} DATA{begin}" if named else "0"]
-    return "\n".join([*lines, "Q", ""])
+    return lines
+
+
+def read_text(folder, text, name="grid.raw"):
+    """Write a text into a folder's file, and read it."""
+    (folder / name).write_text(text, encoding="utf-8")
+    return read_raw(folder / name)

@@ -2,8 +2,7 @@
 
 import pytest
 
-from orchestrator.cases.networks.psse.raw import read_raw
-from tests.cases.networks.psse import raw, records
+from tests.cases.networks.psse import raw, read_text, records
 
 RATES = {33: "0,0,0", 34: ",".join(["0"] * 12), 35: ",".join(["0"] * 12)}
 NODE = {33: "", 34: "", 35: "0,"}
@@ -30,9 +29,7 @@ def read(tmp_path):
         if first:
             found["TRANSFORMER"][4:6] = first
         found["SWITCHED SHUNT"] += [shunt] if shunt else []
-        file = tmp_path / "own.raw"
-        file.write_text(raw(revision, found))
-        return read_raw(file)
+        return read_text(tmp_path, raw(revision, found))
 
     return read
 

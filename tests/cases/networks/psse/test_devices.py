@@ -1,6 +1,5 @@
 """DC lines, FACTS devices, induction machines and GNE of a PSS/E file: loads with the powers of the solved state."""
 
-import json
 import math
 
 import numpy as np
@@ -12,8 +11,8 @@ from orchestrator.cases.networks.data import network_data
 from orchestrator.cases.networks.record_use import UseOfRecord
 from orchestrator.core.errors import InputError
 from tests.cases.networks.psse import BUSES, LINES, LOADS, MACHINES, TRANSFORMERS, raw, records
-from tests.cases.networks.psse.test_dialects import old
-from tests.cases.networks.psse.test_rawx import network, table
+from tests.cases.networks.psse.older_texts import with_shunts_in_buses
+from tests.cases.networks.psse.rawx_texts import network, rawx, table
 
 DC = [
     "'TIE 1',1,8.0,60.0,250.0,0.0,0.0,0.1,'I',0.0,20,1.0",
@@ -294,7 +293,7 @@ def test_every_revision_has_the_same_devices(section, revision, read):
 @pytest.mark.parametrize("revision", [29, 30])
 def test_old_revisions_have_the_same_devices(revision, read):
     """They have no titles: DC lines are the seventh section, FACTS devices the sixteenth."""
-    head = old(revision).rstrip("\n").removesuffix("\n0" * 11)
+    head = with_shunts_in_buses(revision).rstrip("\n").removesuffix("\n0" * 11)
     sections = [[]] * 11
     sections[1] = lines_of("TWO-TERMINAL DC", 33)
     sections[10] = lines_of("FACTS DEVICE", 33)
@@ -476,7 +475,7 @@ def test_rawx_has_the_same_multi_terminal_network_and_gne(bridges, tmp_path, rea
     )
     names = "name model nterm bus1 bus2 nreal nintg nchar stat owner nmet real1 intg1"
     whole["gne"] = table(names, [["G", "OWN", 1, 8, 0, 1, 1, 0, 0, 1, 8, 1.0, 5]])
-    (tmp_path / "nine.rawx").write_text(json.dumps({"network": whole}))
+    (tmp_path / "nine.rawx").write_text(rawx(whole))
     data = network_data(NetworkTable(raw="nine.rawx"), tmp_path)
     assert fed(data) == {name: pytest.approx(value, abs=1e-6) for name, value in usual.items()}
     told = {x.kind: x.why for x in data.records if x.kind == "gne"}

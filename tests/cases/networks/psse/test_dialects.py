@@ -9,6 +9,7 @@ from orchestrator.cases.networks.data import network_data
 from orchestrator.cases.networks.psse.raw import read_raw
 from orchestrator.cases.networks.psse.titles import section_of
 from tests.cases.networks.psse import ORDER, raw, records
+from tests.cases.networks.psse.older_texts import with_shunts_in_buses
 
 
 @pytest.fixture
@@ -25,28 +26,6 @@ def read(tmp_path):
 
 def texts(data):
     return " ".join(problem.text for problem in data.changes)
-
-
-def old(revision):
-    """The WSCC system as revisions 29 and 30 have it: GL and BL in the buses, no fixed shunts."""
-    found = records(33)
-    found["BUS"] = [
-        ",".join(
-            [
-                *line.split(",")[:4],
-                "0",
-                "50" if line.startswith("5") else "0",
-                "1,1",
-                *line.split(",")[7:9],
-                "1",
-            ]
-        )
-        for line in found["BUS"]
-    ]
-    lines = [f"0, 100.0   / PSS/E-{revision}.3  WED, SEP 15 2021", "WSCC", "9 buses"]
-    for section in ("BUS", "LOAD", "GENERATOR", "BRANCH", "TRANSFORMER"):
-        lines += [*found[section], "0 / end of unit cards" if section == "GENERATOR" else "0"]
-    return "\n".join([*lines, *["0"] * 11, ""])
 
 
 def with_blanks(text):
@@ -89,7 +68,7 @@ def test_a_dialect_gives_the_same_network(name, read):
 
 @pytest.mark.parametrize("revision", [29, 30])
 def test_revisions_before_31_have_their_shunts_in_the_buses(revision, read):
-    usual, other = read(raw()), read(old(revision))
+    usual, other = read(raw()), read(with_shunts_in_buses(revision))
     assert (other.lines, other.loads) == (usual.lines, usual.loads)
     assert [(x.bus, x.b_mvar) for x in other.shunts] == [("bus_5", pytest.approx(50))]
 

@@ -1,13 +1,12 @@
 """Impedance correction tables: factors by hand, at and between points, of ratios and of phase shifts."""
 
-import json
+from functools import partial
 
 import pytest
 
-from orchestrator.cases.networks.psse.raw import read_raw
 from orchestrator.core.errors import InputError
-from tests.cases.networks.psse import raw, records
-from tests.cases.networks.psse.test_rawx import network, table
+from tests.cases.networks.psse import raw, read_text, records
+from tests.cases.networks.psse.rawx_texts import network, rawx, table
 
 X = 0.1  # of the transformer between buses 4 and 5 [pu]
 RATIOS = "1,0.9,1.2,1.0,1.0,1.1,0.8"
@@ -16,11 +15,7 @@ SHIFTS = "2,-30,1.3,0,1.0,30,1.5"
 
 @pytest.fixture
 def read(tmp_path):
-    def tables(text, name="grid.raw"):
-        (tmp_path / name).write_text(text)
-        return read_raw(tmp_path / name)
-
-    return tables
+    return partial(read_text, tmp_path)
 
 
 def with_transformer(revision, corrections, windv=1.0, ang=0.0, tab=1):
@@ -110,5 +105,5 @@ def test_rows_of_json_are_one_table(read):
     given["impcor"] = table(
         "itable tap refact imfact", [[3, 0.9, 1.2, 0], [3, 1.0, 1.0, 0], [3, 1.1, 0.8, 0.1]]
     )
-    found = read(json.dumps({"network": given}), "grid.rawx")
+    found = read(rawx(given), "grid.rawx")
     assert complex(*found.tables.branch[-2][2:4]) == pytest.approx(1j * X * (0.9 + 0.05j))

@@ -4,16 +4,14 @@ from collections import Counter
 
 import pytest
 
-from orchestrator.cases.networks.psse.raw import read_raw
 from orchestrator.cases.networks.record_use import UseOfRecord, details, in_one_line
-from tests.cases.networks.psse import raw, records
+from tests.cases.networks.psse import raw, read_text, records
 
 
 @pytest.fixture
 def read(tmp_path):
     def write(revision, found):
-        (tmp_path / "grid.raw").write_text(raw(revision, found), encoding="utf-8")
-        return read_raw(tmp_path / "grid.raw")
+        return read_text(tmp_path, raw(revision, found))
 
     return write
 

@@ -1,63 +1,18 @@
 """RAWX, PSS/E's data in JSON: the same network as the RAW file's, whatever the order of the fields."""
 
-import json
-
 import numpy as np
 import pytest
 
 from fmus.grid.element_data import SMALLEST_REACTANCE
-from orchestrator.cases.networks.psse.raw import read_raw
 from orchestrator.core.errors import InputError
-from tests.cases.networks.psse import (
-    BUSES,
-    LINES,
-    LOADS,
-    MACHINES,
-    REACTANCES,
-    TRANSFORMERS,
-    raw,
-    records,
-)
-
-
-def table(fields, rows):
-    return {"fields": fields.split(), "data": rows}
-
-
-def network():
-    """The nine buses, fields in another order than RAW's and no more than differ from their defaults."""
-    return {
-        "caseid": {
-            "fields": ["title1", "rev", "sbase", "basfrq", "ic"],
-            "data": ["nine buses", 35, 100.0, 60.0, 0],
-        },
-        "general": table("thrshz pqbrak", [[0.0001, 0.7]]),
-        "bus": table(
-            "name ibus ide baskv nvlo nvhi vm va",
-            [[f"BUS {n}", n, kind, kv, 0.9, 1.1, vm, 0.0] for n, (kv, kind, vm) in BUSES.items()],
-        ),
-        "load": table("ql pl ibus loadid", [[q, p, n, "1"] for n, (p, q) in LOADS.items()]),
-        "generator": table(
-            "ibus machid pg qt qb vs mbase zx stat pt",
-            [
-                [n, "1", p, 300, -300, v, base, REACTANCES[n], None, base]
-                for n, (p, v, base) in MACHINES.items()
-            ],
-        ),
-        "acline": table("ibus jbus bpu rpu xpu", [[i, j, b, r, x] for i, j, r, x, b in LINES]),
-        "transformer": table(
-            "ibus jbus x1_2 name", [[i, j, x, f"T {j}"] for i, j, x in TRANSFORMERS]
-        ),
-        "subnode": table("isub inode", [[1, 2, 3, 4]]),
-    }
+from tests.cases.networks.psse import BUSES, TRANSFORMERS, raw, read_text, records
+from tests.cases.networks.psse.rawx_texts import network, rawx, table
 
 
 @pytest.fixture
 def read(tmp_path):
     def write(text, name="nine.rawx"):
-        path = tmp_path / name
-        path.write_text(text if isinstance(text, str) else json.dumps({"network": text}, indent=1))
-        return read_raw(path)
+        return read_text(tmp_path, text if isinstance(text, str) else rawx(text), name)
 
     return write
 
@@ -90,7 +45,7 @@ def test_a_mistake_is_told_with_its_line(read):
     wrong = network()
     wrong["load"]["data"][1][2] = 77
     (told,) = [change for change in read(wrong).changes if "no bus 77" in change.text]
-    lines = json.dumps({"network": wrong}, indent=1).splitlines()
+    lines = rawx(wrong).splitlines()
     number = int(told.place.partition("line ")[2])
     assert lines[number - 1].strip() == "["
     assert "77" in lines[number + 2]

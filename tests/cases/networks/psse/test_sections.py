@@ -2,14 +2,9 @@
 
 import pytest
 
-from orchestrator.cases.networks.psse.raw import read_raw
 from orchestrator.core.errors import InputError
 from tests.cases.networks.psse import raw
-
-
-def read(tmp_path, text):
-    (tmp_path / "grid.raw").write_text(text)
-    return read_raw(tmp_path / "grid.raw")
+from tests.cases.networks.psse import read_text as read
 
 
 def silent(text, section, following, line="0"):
