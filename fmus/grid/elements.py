@@ -61,13 +61,14 @@ Inductor = Callable[[ModelBuilder, Bus, str, Expr, Scalar], list[Branch]]
 @dataclass(frozen=True)
 class LineValues:
     """Parameters of a line: series impedance, ratio at the from side (None without one), 1 or 0 where it is open,
-    series capacitor (None without one)."""
+    series capacitor (None without one), charging (None without any)."""
 
     R: Expr
     X: Expr
     ratio: Phasor | None
     connected: Expr
     X_C: Expr | None = None
+    B: Expr | None = None
 
 
 def declare_bus(m: ModelBuilder, name: str) -> Bus:
@@ -144,12 +145,12 @@ def declare_line_values(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> L
         ratio = polar(
             turns, parameter("shift", line.shift, "rad", "Phase shift at the from side", None, None)
         )
+    B = None
     if line.B:
-        B = parameter("B", line.B, "pu", "Charging", 1e-9, None) * (
-            OPEN_CHARGING + (1 - OPEN_CHARGING) * connected
-        )
-        start.B += B / 2 / turns**2
-        end.B += B / 2
+        B = parameter("B", line.B, "pu", "Charging", 1e-9, None)
+        rest = OPEN_CHARGING + (1 - OPEN_CHARGING) * connected if line.is_plain else OPEN_CHARGING
+        start.B += B * rest / 2 / turns**2
+        end.B += B * rest / 2
     X_C = None
     if line.X_C:
         text = f"Reactance of the series capacitor of line {line.name}"
@@ -159,7 +160,7 @@ def declare_line_values(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> L
         m.require(
             X - X_C, f"line {line.name}: X must exceed X_C, the reactance of its series capacitor"
         )
-    return LineValues(R, X, ratio, connected, X_C)
+    return LineValues(R, X, ratio, connected, X_C, B)
 
 
 def declare_line(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> Branch:

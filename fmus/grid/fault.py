@@ -1,7 +1,8 @@
-"""Three-phase faults at buses: an impedance R + jX to earth behind a switch.
+"""Faults: an impedance R + jX to earth behind a switch.
 
 In an EMT network its current is a state; once the fault is over the current fades within a millisecond, as that of a
-line which opens. In a network of phasors it is an admittance."""
+line which opens. In a network of phasors it is an admittance, and may be that of a fault of fewer phases: R + jX then
+hold the impedances of the other sequences, which may be capacitive."""
 
 from fmus.grid.element_data import SMALLEST_REACTANCE
 from fmus.grid.elements import Branch, Bus
@@ -10,10 +11,15 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port_variables import SYSTEM_BASE
 from fmus.toolchain.symbols import Expr
 
+LARGEST_REACTANCE = 100.0  # of a fault in an EMT network [pu, 100 MVA]
+_LARGEST_CAPACITIVE = 1e6
+"""Largest size of a fault's reactance in a network of phasors [pu, 100 MVA]: where neutrals are not earthed, the small
+capacitance to earth of the network is met in series."""
+
 
 def declare_fault(m: ModelBuilder, bus: str, buses: dict[str, Bus]) -> Branch:
     """Declare a fault at a bus, with its current as a state."""
-    R, X, on = _declare_values(m, bus)
+    R, X, on = _declare_values(m, bus, SMALLEST_REACTANCE, LARGEST_REACTANCE)
     text = "Current of the fault"
     with m.scope(f"{bus}.fault"):
         current = Phasor(
@@ -24,9 +30,10 @@ def declare_fault(m: ModelBuilder, bus: str, buses: dict[str, Bus]) -> Branch:
     return Branch(current, current, R, X, bus, connected=on)
 
 
-def fault_admittance(m: ModelBuilder, bus: str) -> Phasor:
-    """Declare a fault at a bus; its admittance is 0 while there is none."""
-    R, X, on = _declare_values(m, bus)
+def fault_admittance(m: ModelBuilder, place: str) -> Phasor:
+    """Declare a fault at a bus or along a line; its admittance is 0 while there is none."""
+    R, X, on = _declare_values(m, place, -_LARGEST_CAPACITIVE, _LARGEST_CAPACITIVE)
+    m.require(R * R + X * X, f"the fault of {place} has no impedance: give it a reactance")
     return Phasor(1.0, 0.0) / Phasor(R, X) * on
 
 
@@ -49,7 +56,9 @@ def declare_fault_outputs(m: ModelBuilder, bus: str, current: Phasor) -> None:
         )
 
 
-def _declare_values(m: ModelBuilder, bus: str) -> tuple[Expr, Expr, Expr]:
+def _declare_values(
+    m: ModelBuilder, bus: str, least: float, most: float
+) -> tuple[Expr, Expr, Expr]:
     with m.scope(f"{bus}.fault"):
         return (
             m.parameter(
@@ -67,8 +76,8 @@ def _declare_values(m: ModelBuilder, bus: str) -> tuple[Expr, Expr, Expr]:
                 "pu",
                 f"Reactance of a fault at {bus}",
                 base=SYSTEM_BASE,
-                minimum=SMALLEST_REACTANCE,
-                maximum=100,
+                minimum=least,
+                maximum=most,
                 tunable=True,
             ),
             m.switch("on", False, f"There is a fault at {bus}", tunable=True),

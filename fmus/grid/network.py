@@ -223,6 +223,11 @@ class Network:
                 yield f"transformer {x.name!r} has the ratio {min(x.tap):g}; it must exceed 0, and is 1 without one"
         if not self.phasors:
             yield from (
+                f"line {x.name!r}: ends that switch one by one, and faults along it, are for networks of phasors"
+                for x in self.lines
+                if not x.is_plain
+            )
+            yield from (
                 f"shunt {x.name!r} has the negative conductance {x.g_mw:g} MW{_ONLY_PHASORS}"
                 for x in self.shunts
                 if x.g_mw < 0

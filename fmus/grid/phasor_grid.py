@@ -7,10 +7,12 @@ The matrix is data, which the kernel factorises anew where a parameter or an adm
 Elements, parameters and outputs are those of `grid`. Constant-impedance loads, ratios and open lines behave as
 described there."""
 
+from collections.abc import Mapping, Sequence
 from math import pi
 
 from fmus.grid import elements
 from fmus.grid.fault import declare_fault_outputs, fault_admittance
+from fmus.grid.line_parts import LineParts, declare_line_parts
 from fmus.grid.load_laws import FollowingLoad, declare_following_load, following_load_equations
 from fmus.grid.network import Line, Network, Port
 from fmus.grid.nodal import Admittances, add_admittance
@@ -61,22 +63,38 @@ def phasor_grid(network: Network) -> Model:
     faults = {bus: fault_admittance(m, bus) for bus in network.faults}
     for name, y in faults.items():
         add_admittance(Y, name, name, y)
-    for line, values in zip(network.lines, lines, strict=True):
-        _add_line(Y, line, values)
+    parts = _add_lines(m, Y, network.lines, lines)
     transformers = [declare_windings(m, data) for data in network.transformers]
     for transformer in transformers:
         add_windings(Y, transformer)
     _settle(m, buses, Y)
     for following_load in following:
         following_load_equations(m, following_load)
-    drawn = [_drawn(line, values, buses) for line, values in zip(network.lines, lines, strict=True)]
+    drawn = [
+        _drawn(line, values, buses, parts.get(line.name))
+        for line, values in zip(network.lines, lines, strict=True)
+    ]
     fed = [(e - buses[port.bus].v) * y for port, (e, y) in zip(network.ports, sources, strict=True)]
     elements.declare_network_outputs(m, network, buses, drawn, fed)
     for transformer in transformers:
         declare_winding_powers(m, transformer, buses)
     for name, y in faults.items():
         declare_fault_outputs(m, name, buses[name].v * y)
+    _declare_line_fault_outputs(m, network.lines, lines, parts, buses)
     return m.build()
+
+
+def _declare_line_fault_outputs(
+    m: ModelBuilder,
+    lines: Sequence[Line],
+    declared: Sequence[elements.LineValues],
+    parts: Mapping[str, LineParts],
+    buses: dict[str, elements.Bus],
+) -> None:
+    for line, values in zip(lines, declared, strict=True):
+        if line.faulted:
+            ends = _behind_ratio(line, values, buses)
+            declare_fault_outputs(m, line.name, parts[line.name].fault_current(*ends))
 
 
 def _settle(m: ModelBuilder, buses: dict[str, elements.Bus], Y: Admittances) -> None:
@@ -121,19 +139,52 @@ def _susceptance(
     return []
 
 
-def _add_line(Y: Admittances, line: Line, values: elements.LineValues) -> None:
+def _add_lines(
+    m: ModelBuilder, Y: Admittances, lines: Sequence[Line], declared: Sequence[elements.LineValues]
+) -> dict[str, LineParts]:
+    """Add all lines; return the parts of those that have any."""
+    parts = {
+        line.name: declare_line_parts(m, line, values, _series(values))
+        for line, values in zip(lines, declared, strict=True)
+        if not line.is_plain
+    }
+    for line, values in zip(lines, declared, strict=True):
+        _add_line(Y, line, values, parts.get(line.name))
+    return parts
+
+
+def _add_line(
+    Y: Admittances, line: Line, values: elements.LineValues, parts: LineParts | None
+) -> None:
     """Series admittance y behind the ratio t: y/|t|² and y on the diagonal, −y/t* and −y/t beside it."""
     y = _series(values)
+    one, other, between = (y, y, -y) if parts is None else (*parts.own(), parts.between())
     t = Phasor(1.0, 0.0) if values.ratio is None else values.ratio
-    add_admittance(Y, line.from_bus, line.from_bus, y / (t.re**2 + t.im**2))
-    add_admittance(Y, line.to_bus, line.to_bus, y)
-    add_admittance(Y, line.from_bus, line.to_bus, -y / t.conjugate())
-    add_admittance(Y, line.to_bus, line.from_bus, -y / t)
+    add_admittance(Y, line.from_bus, line.from_bus, one / (t.re**2 + t.im**2))
+    add_admittance(Y, line.to_bus, line.to_bus, other)
+    add_admittance(Y, line.from_bus, line.to_bus, between / t.conjugate())
+    add_admittance(Y, line.to_bus, line.from_bus, between / t)
 
 
-def _drawn(line: Line, values: elements.LineValues, buses: dict[str, elements.Bus]) -> Phasor:
+def _behind_ratio(
+    line: Line, values: elements.LineValues, buses: dict[str, elements.Bus]
+) -> tuple[Phasor, Phasor]:
+    """Voltages behind the ratio at the from side, and at the to bus."""
+    v_from, v_to = buses[line.from_bus].v, buses[line.to_bus].v
+    return (v_from if values.ratio is None else v_from / values.ratio), v_to
+
+
+def _drawn(
+    line: Line,
+    values: elements.LineValues,
+    buses: dict[str, elements.Bus],
+    parts: LineParts | None,
+) -> Phasor:
     """Current of a line at its from bus, without its charging."""
     v_from, v_to = buses[line.from_bus].v, buses[line.to_bus].v
+    if parts is not None:
+        drawn = parts.drawn(*_behind_ratio(line, values, buses))
+        return drawn if values.ratio is None else drawn / values.ratio.conjugate()
     if values.ratio is None:
         return (v_from - v_to) * _series(values)
     return (v_from / values.ratio - v_to) * _series(values) / values.ratio.conjugate()
