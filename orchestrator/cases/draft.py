@@ -6,6 +6,7 @@ from pathlib import Path
 
 from fmus.grid.network import Network
 from orchestrator.cases.flow.sharing import Dispatch
+from orchestrator.cases.flow.solved_fault import SolvedFault
 from orchestrator.cases.form.build_choices import Layer
 from orchestrator.cases.form.parameter_files import ParameterFile
 from orchestrator.cases.form.schema import CaseTable, ComponentTable, EventTable, ScenarioTable
@@ -69,6 +70,7 @@ class Findings:
     ratings: dict[str, float] = field(default_factory=dict)
     # components of other scenarios to which a layer gives values, by ``component.variable``, with the place.
     absent: dict[str, str] = field(default_factory=dict)
+    faults: list[SolvedFault] = field(default_factory=list)  # of fewer phases, and open poles
     not_reached: list[float] = field(default_factory=list)
     # components whose form the network cannot take, each with its model; what follows from that is not noted.
     misfits: dict[str, str] = field(default_factory=dict)

@@ -1,12 +1,12 @@
 """Events in words: references that swing (``--force``) and short circuits (``--fault``), as tables of a case."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from orchestrator.cases.case import Case
-from orchestrator.cases.form.schema import BusFaultTable, CaseTable, ForcingTable
+from orchestrator.cases.form.schema import BusFaultTable, CaseTable, ForcingTable, LineFaultTable
 from orchestrator.cases.networks.data import bus_name
 from orchestrator.core.errors import InputError
 from orchestrator.core.units import to_unit
@@ -26,13 +26,22 @@ _FORMS = {
         BusFaultTable,
         "bus_fault",
         re.compile(
-            r"(bus )?(?P<bus>[^,]+?)\s*,\s*(?P<duration>[^\s,]+\s*[mu]?s)(\s*,\s*opens\s+(?P<cleared_by>[^,]+?))?"
+            r"(bus )?(?P<bus>[^,]+?)\s*,\s*(?P<duration>[^\s,]+\s*[mu]?s)(\s*,\s*(?P<kind>[123]-phase(-earth)?))?"
+            r"(\s*,\s*opens\s+(?P<cleared_by>[^,]+?))?(\s*,\s*recloses\s+after\s+(?P<reclose_after>\S+\s*[mu]?s))?"
             r"(\s*,?\s*from\s+(?P<time>\S+\s*[mu]?s))?"
         ),
-        "'BUS, DURATION', such as 'bus_9, 150 ms'; the line that clears it ('opens line_7_9')",
+        "'PLACE, DURATION', such as 'bus_9, 150 ms' or 'line_7_9 at 30 %, 100 ms'; the phases ('1-phase', '2-phase', "
+        "'2-phase-earth'), what clears it ('opens line_7_9'; along a line 'opens it' or 'opens one pole', and "
+        "'recloses after 500 ms')",
     ),
 }
 """Option → what it asks for, its form, and that in words."""
+
+_ALONG = re.compile(r"(?P<line>.+?)\s+at\s+(?P<at>\S+?(\s*%)?)")
+_OPENED = {
+    "it": "line",
+    "one pole": "pole",
+}  # words for what opens at the end of a fault along a line
 
 
 def with_events(case: Case, forcings: Sequence[str], faults: Sequence[str]) -> Case:
@@ -65,7 +74,10 @@ def _reason(detail: Any) -> str:
     return f"{place} = {detail['input']!r}; {said.replace('Input should be', 'it must be')}"
 
 
-def event_of(option: str, text: str) -> ForcingTable | BusFaultTable:
+EventInWords = ForcingTable | BusFaultTable | LineFaultTable
+
+
+def event_of(option: str, text: str) -> EventInWords:
     """An event in words: ``sg35.exciter.V_ref 0.8 Hz 0.02 pu square from 2 s``, ``bus_9, 150 ms, opens line_7_9``."""
     kind, name, form, how = _FORMS[option]
     parts = form.fullmatch(" ".join(text.split()))
@@ -77,9 +89,23 @@ def event_of(option: str, text: str) -> ForcingTable | BusFaultTable:
     try:
         time = to_unit(given.pop("time", _BEGIN), "s")
         given |= {"bus": bus_name(given["bus"])} if " " not in given.get("bus", " ") else {}
-        table: ForcingTable | BusFaultTable = kind(type=name, time=time, **given)
+        along = _ALONG.fullmatch(given.get("bus", ""))
+        if along is not None:
+            kind, name, given = LineFaultTable, "line_fault", _along_a_line(given, along)
+        table: EventInWords = kind(type=name, time=time, **given)
         return table.asked_as(f"--{option} {text!r}")
     except ValueError as error:  # pydantic's and ours
         details = error.errors() if hasattr(error, "errors") else []
         reasons = [_reason(one) for one in details] or [str(error)]
         raise InputError(f"--{option} {text!r}: {'; '.join(reasons)}") from error
+
+
+def _along_a_line(given: Mapping[str, str], along: re.Match[str]) -> dict[str, str]:
+    """Return the keys of a fault along a line, from those of one at a bus."""
+    found = {key: word for key, word in given.items() if key not in ("bus", "cleared_by")}
+    opened = given.get("cleared_by")
+    if opened is not None and opened not in _OPENED:
+        raise ValueError(
+            f"opens {opened!r}: along a line it is 'opens it' or 'opens one pole'; other lines open by [[events]]"
+        )
+    return found | along.groupdict() | ({"opens": _OPENED[opened]} if opened else {})

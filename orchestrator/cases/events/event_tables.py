@@ -10,6 +10,9 @@ from fmus.grid.network import Network
 from orchestrator.cases.draft import Draft, Findings
 from orchestrator.cases.events.fault_tables import component_events, note_conflicts, wire_events
 from orchestrator.cases.events.islands import question_islands
+from orchestrator.cases.events.line_events import line_events
+from orchestrator.cases.events.unbalanced_faults import solve_unbalanced
+from orchestrator.cases.flow.power_flow import PowerFlow
 from orchestrator.cases.flow.sharing import power_limits
 from orchestrator.cases.form import schema
 from orchestrator.cases.form.names import close_names, hint_at
@@ -27,7 +30,9 @@ _TOUCHED = 1e-3  # power [pu, S_n] beyond a limit that does not count
 _LONG_FAULT = 10.0  # duration of a fault [s] above which one without a unit is questioned
 
 
-def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Event, ...]:
+def scenario_events(
+    draft: Draft, clock: Clock | None, stop: float, flow: PowerFlow | None = None
+) -> tuple[Event, ...]:
     """The events of the scenario, or of the case if the scenario has no events, up to the stop time [s]. Problems are
     noted."""
     head = () if draft.given.scenario.events is None else ("scenarios", draft.given.name)
@@ -57,6 +62,8 @@ def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Eve
         else draft.given.place("solver", "stop_time")
     )
     _is_point(draft, clock, stop, "the stop", where)
+    if not draft.found.problems:
+        events = solve_unbalanced(draft, flow, events)
     question_islands(draft, [(event, where) for event, where in events if event.time < stop])
     return tuple(event for event in note_conflicts(draft, events, clock) if event.time < stop)
 
@@ -103,7 +110,7 @@ def _note_late(draft: Draft, time: float, stop: float, where: str) -> None:
 
 def _endless(table: schema.EventTable, stop: float) -> Iterator[str]:
     """Questions about what ends only after the run, or lasts so long that its unit is in doubt."""
-    if isinstance(table, schema.BusFaultTable) and table.duration is not None:
+    if isinstance(table, schema.FaultBase) and table.duration is not None:
         seen = f"duration = {table.duration:g} s"
         slip = (
             f"; if {table.duration:g} ms is meant, write '{table.duration:g} ms'"
@@ -114,8 +121,10 @@ def _endless(table: schema.EventTable, stop: float) -> Iterator[str]:
             yield f"{seen}: the fault is not cleared before the run stops at {stop:g} s{slip}"
         elif table.has_bare_duration and table.duration > _LONG_FAULT:
             yield f"{seen}, without a unit: a fault is cleared within a second{slip}, else '{table.duration:g} s'"
-    reclose = table.reclose_after if isinstance(table, schema.LineTripTable) else None
-    if reclose is not None and table.time + reclose > stop:
+    reclosing = schema.LineTripTable | schema.LineFaultTable | schema.BusFaultTable
+    reclose = table.reclose_after if isinstance(table, reclosing) else None
+    opened = table.time + (getattr(table, "duration", None) or 0.0)
+    if reclose is not None and opened + reclose > stop:
         yield f"reclose_after = {reclose:g} s: the line recloses only after the run, which stops at {stop:g} s"
 
 
@@ -166,6 +175,8 @@ def _events_of(draft: Draft, table: schema.SettingEventTable, where: str) -> lis
         return []
     if isinstance(table, schema.UnitSwitchingTable):
         return _unit_switching(draft, table, component)
+    if isinstance(table, schema.FaultBase | schema.LineTripTable):
+        return line_events(draft, table, component, where)
     return _grid_or_reference_events(table, component)
 
 
@@ -288,16 +299,9 @@ def _grid_or_reference_events(table: schema.EventTable, component: str) -> list[
             return [coupled.LoadSwitching(table.time, component, table.load, 0.0)]
         case schema.LoadReconnectionTable():
             return [coupled.LoadSwitching(table.time, component, table.load, table.scale)]
-        case schema.LineTripTable():
-            opened = coupled.LineSwitching(table.time, component, table.line, False)
-            if table.reclose_after is None:
-                return [opened]
-            return [opened, replace(opened, time=table.time + table.reclose_after, connected=True)]
         case schema.ShuntTripTable() | schema.ShuntReconnectionTable():
             closed = isinstance(table, schema.ShuntReconnectionTable)
             return [coupled.ShuntSwitching(table.time, component, table.shunt, closed)]
-        case schema.BusFaultTable():
-            return _fault(table, component)
         case schema.LineReclosingTable():
             return [coupled.LineSwitching(table.time, component, table.line, True)]
         case schema.BranchChangeTable():
@@ -309,16 +313,6 @@ def _grid_or_reference_events(table: schema.EventTable, component: str) -> list[
             return [coupled.ParameterChange(table.time, component, table.parameter, value)]
         case _:
             raise TypeError(f"{type(table).__name__} is no event of the grid or of a component")
-
-
-def _fault(table: schema.BusFaultTable, grid: str) -> list[Event]:
-    events: list[Event] = [coupled.BusFault(table.time, grid, table.bus, True, table.R, table.X)]
-    if table.duration is not None:
-        end = table.time + table.duration
-        events.append(coupled.BusFault(end, grid, table.bus, False))
-        if table.cleared_by is not None:
-            events.append(coupled.LineSwitching(end, grid, table.cleared_by, False))
-    return events
 
 
 def _checked(
@@ -365,7 +359,7 @@ def _unknown(event: Event, component: str, variable: str, plan: ComponentPlan) -
     names = plan.description.variables
     wanted, kind, known = "", "", list[str]()
     match event:
-        case coupled.LineSwitching() | coupled.BranchChange():
+        case coupled.LineSwitching() | coupled.BranchChange() | coupled.LineFault():
             wanted, kind, known = event.line, "line", lines_among(names)
         case coupled.LoadChange():
             wanted, kind, known = event.load, "load", _elements(names, "scale")

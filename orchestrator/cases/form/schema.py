@@ -16,7 +16,7 @@ from orchestrator.cases.form.names import file_name
 from orchestrator.core.foreign_files import one_line
 from orchestrator.core.toml_files import Table
 from orchestrator.core.units import to_unit
-from orchestrator.systems.coupling.events import ForcingShape
+from orchestrator.systems.coupling.events import FaultKind, ForcingShape
 from orchestrator.systems.coupling.schedule import TOLERANCES, ScheduleName
 
 Value = bool | float | str
@@ -171,6 +171,25 @@ class ShuntTable(Table):
     b: Megavar = 0.0
 
 
+VectorGroup = Annotated[str, Field(pattern=r"(?i)^(yn|y|d)(yn|y|d)\d{0,2}((yn|y|d)\d{0,2})?$")]
+"""``YNd5``, the winding at the from bus first; of three windings ``YNynd``."""
+
+
+class SequencesTable(Table):
+    """The negative and the zero sequence, where no file has them."""
+
+    line_z0: Number | None = Field(default=None, gt=0, allow_inf_nan=False)
+    line_b0: Number | None = Field(default=None, ge=0, allow_inf_nan=False)
+    transformer_x0: Number | None = Field(default=None, gt=0, allow_inf_nan=False)
+    transformers: VectorGroup | None = None
+    step_up: VectorGroup | None = None
+    groups: dict[str, VectorGroup] = {}
+    machine_x2: Number | None = Field(default=None, gt=0, allow_inf_nan=False)
+    machine_x0: Number | None = Field(default=None, gt=0, allow_inf_nan=False)
+    converter_x2: Number | None = Field(default=None, gt=0, allow_inf_nan=False)
+    external_z0: Number | None = Field(default=None, gt=0, allow_inf_nan=False)
+
+
 class NetworkTable(Table):
     """A network for the model ``grid``: another program's, or written out, or both together."""
 
@@ -178,6 +197,7 @@ class NetworkTable(Table):
     pandapower: str | None = None
     raw: str | None = None
     cgmes: str | None = None
+    seq: str | None = None
     leave_out: list[str] = []
     keep_load_parts: Annotated[bool, Field(strict=True)] = False
     move_controls: Annotated[bool, Field(strict=True)] = False
@@ -194,6 +214,7 @@ class NetworkTable(Table):
     generation_model: LoadModelTable = LoadModelTable()
     device_model: LoadModelTable = LoadModelTable()
     shunts: dict[str, ShuntTable] = {}
+    sequences: SequencesTable = SequencesTable()
 
 
 class UnitsTable(Table):
@@ -374,10 +395,11 @@ class ShuntReconnectionTable(GridEventBase):
 
 
 class LineTripTable(GridEventBase):
-    """A line opens, and may close again."""
+    """A line opens, at both ends or at one of its buses alone, and may close again."""
 
     type: Literal["line_trip"]
     line: str
+    at: Bus | None = None
     reclose_after: Seconds | None = Field(default=None, gt=0)
 
 
@@ -386,15 +408,13 @@ class LineReclosingTable(GridEventBase):
     line: str
 
 
-class BusFaultTable(GridEventBase):
-    """A three-phase fault at a bus; where a line clears it, that line opens when the fault ends."""
+class FaultBase(GridEventBase):
+    """Common part of faults: how many phases, the impedance, and how long."""
 
-    type: Literal["bus_fault"]
-    bus: Bus
+    kind: FaultKind = "3-phase"
     R: PerUnit = Field(default=0.0, ge=0, allow_inf_nan=False)
     X: PerUnit = Field(default=0.0, ge=0, allow_inf_nan=False)
     duration: Seconds | None = Field(default=None, gt=0)
-    cleared_by: str | None = None
     _bare: bool = PrivateAttr(default=False)
 
     @model_validator(mode="wrap")
@@ -409,11 +429,49 @@ class BusFaultTable(GridEventBase):
         """Return whether the duration is a number without a unit."""
         return self.duration is not None and self._bare
 
+
+class BusFaultTable(FaultBase):
+    """A fault at a bus; where a line clears it, that line opens when the fault ends."""
+
+    type: Literal["bus_fault"]
+    bus: Bus
+    cleared_by: str | None = None
+    reclose_after: Seconds | None = Field(default=None, gt=0)
+
     @model_validator(mode="after")
     def _has_an_end_to_clear(self) -> Self:
+        if self.reclose_after is not None and self.cleared_by is None:
+            raise ValueError(
+                "'reclose_after' needs 'cleared_by': the line that opens, and closes again"
+            )
         if self.cleared_by is not None and self.duration is None:
             raise ValueError(
                 "'cleared_by' needs 'duration': the time from the fault to the opening of the line"
+            )
+        return self
+
+
+class LineFaultTable(FaultBase):
+    """A fault along a line, at a part of the way from its from bus; the line may open as the fault ends, with all
+    three phases or the faulted one, and close again."""
+
+    type: Literal["line_fault"]
+    line: str
+    at: Annotated[float, BeforeValidator(_share), Field(gt=0, lt=1)]
+    opens: Literal["no", "line", "pole"] = "no"
+    reclose_after: Seconds | None = Field(default=None, gt=0)
+
+    @model_validator(mode="after")
+    def _is_one_story(self) -> Self:
+        if self.opens != "no" and self.duration is None:
+            raise ValueError(
+                "'opens' needs 'duration': the time from the fault to the opening of the line"
+            )
+        if self.reclose_after is not None and self.opens == "no":
+            raise ValueError("'reclose_after' needs 'opens': what has not opened cannot close")
+        if self.opens == "pole" and (self.kind != "1-phase" or self.reclose_after is None):
+            raise ValueError(
+                "opens = 'pole' is for a fault of kind '1-phase', and needs 'reclose_after': the dead time"
             )
         return self
 
@@ -472,6 +530,7 @@ SettingEventTable = (
     | UnitSwitchingTable
     | BranchChangeTable
     | BusFaultTable
+    | LineFaultTable
     | ShuntTripTable
     | ShuntReconnectionTable
     | ReferenceChangeTable

@@ -21,12 +21,14 @@ from orchestrator.cases.form.csv_rows import (
 )
 from orchestrator.cases.form.remedies import with_frequency
 from orchestrator.cases.form.schema import NetworkTable
+from orchestrator.cases.networks.branch_keys import BranchKey
 from orchestrator.cases.networks.branch_limits import FileLimits
 from orchestrator.cases.networks.cgmes.network import read_cgmes
 from orchestrator.cases.networks.controls import Control, with_controls
 from orchestrator.cases.networks.conversion import (
     Generation,
     ImportedNetwork,
+    branch_names,
     bus_of,
     import_network,
 )
@@ -37,6 +39,8 @@ from orchestrator.cases.networks.psse.device_flow import solved_devices
 from orchestrator.cases.networks.psse.device_notes import device_notes
 from orchestrator.cases.networks.psse.raw import read_raw
 from orchestrator.cases.networks.psse.raw_network import FileLoad, Machine, RawNetwork, bus_of_unit
+from orchestrator.cases.networks.psse.sequence_elements import CaseElements, SequenceReading
+from orchestrator.cases.networks.psse.sequence_records import read_sequence_file
 from orchestrator.cases.networks.psse.solution import half_digit, stated_voltages
 from orchestrator.cases.networks.psse.static_vars import Modelled
 from orchestrator.cases.networks.psse.studied_parts import (
@@ -47,6 +51,7 @@ from orchestrator.cases.networks.psse.studied_parts import (
 )
 from orchestrator.cases.networks.record_use import RecordUse
 from orchestrator.cases.networks.regions import Regions
+from orchestrator.cases.networks.sequence_data import SequenceData
 from orchestrator.cases.networks.sources import read_matpower, read_pandapower
 from orchestrator.core.arrays import Matrix
 from orchestrator.core.errors import InputError, Problem
@@ -71,6 +76,7 @@ class _Source:
     file_loads: tuple[FileLoad, ...] = ()
     controls: tuple[Control, ...] = ()  # taps and shunts that move after an outage
     counted_controls: str = ""  # how many could move, in words
+    raw: RawNetwork | None = None  # what another file of the same program may name
 
 
 @dataclass(frozen=True)
@@ -114,6 +120,7 @@ class NetworkData:
     recorded_loads: frozenset[str] = frozenset()
     controls: tuple[Control, ...] = ()  # taps and shunts that move in the power flow of an outage
     counted_controls: str = ""  # how many could move, in words
+    sequences: SequenceData | None = None  # of the negative and the zero sequence, from a file
 
 
 def network_data(
@@ -146,6 +153,7 @@ def network_data(
             bus = bus_name(row["bus"])
             load = Load(f"load_{row['bus']}", bus, number(row, "p_mw"), number(row, "q_mvar"))
             loads.append(with_laws(load, table))
+    sequences = _sequences(found, table, directory, [*source.lines])
     buses = dict.fromkeys((*source.buses, *table.buses))
     if not buses:  # no list of buses to check the lines' ends against: the ends define the buses
         ends = [bus for line in lines for bus in (line.from_bus, line.to_bus)]
@@ -168,7 +176,7 @@ def network_data(
         stray_B=table.stray_B,
         places={line.name: place for line, place in in_file},
         transformers=(*source.transformers, *transformers),
-        changes=found.changes,
+        changes=(*found.changes, *(sequences.questions if sequences else ())),
         machines=found.machines,
         idle_machines=found.idle,
         feeding=source.feeding,
@@ -181,7 +189,7 @@ def network_data(
             if load.name in source.load_parts
         },
         limits=source.limits if table.raw or table.matpower else FileLimits(),
-        records=found.records,
+        records=(*found.records, *(sequences.records if sequences else ())),
         titles=source.titles,
         branch_names=source.branch_names,
         unit_names=source.unit_names,
@@ -190,7 +198,50 @@ def network_data(
         file_loads=found.file_loads,
         controls=found.controls,
         counted_controls=found.counted_controls,
+        sequences=sequences.data if sequences else _without_file(found),
     )
+
+
+def _sequences(
+    found: _Source, table: NetworkTable, directory: Path, lines: list[Line]
+) -> SequenceReading | None:
+    """Read the file of sequence data; None without one."""
+    if table.seq is None:
+        return None
+    if found.raw is None:
+        raise InputError(
+            "seq is for networks of PSS/E: give the network as 'raw', or write ratios in [network.sequences]"
+        )
+    raw, buses = found.raw, set(found.network.buses)
+
+    def bus_of_number(number: int) -> str | None:
+        label = raw.tables.labels.get(raw.same.get(number, number))
+        name = None if label is None else bus_of(label)
+        return name if name in buses else None
+
+    elements = CaseElements(
+        _keys(raw),
+        {line.name: line for line in lines},
+        found.machines,
+        raw.tables.base_mva,
+        bus_of_number,
+        frozenset({*raw.tables.labels, *raw.same}),
+    )
+    return SequenceReading(read_sequence_file(seen_from_here(directory / table.seq)), elements)
+
+
+def _keys(raw: RawNetwork) -> dict[str, BranchKey]:
+    """Return the keys of branches by the names of their lines."""
+    named = zip(branch_names(raw.tables), raw.tables.branch_keys, strict=True)
+    return {name: key for name, key in named if name is not None and key is not None}
+
+
+def _without_file(found: _Source) -> SequenceData | None:
+    """Return which branches are transformers, where the source tells."""
+    if found.raw is None:
+        return None
+    keys = _keys(found.raw).items()
+    return SequenceData(transformers=frozenset(name for name, key in keys if key.is_transformer))
 
 
 def _star(one_two: float, one_three: float, two_three: float) -> tuple[float, float, float]:
@@ -331,6 +382,7 @@ def _read_from_raw(asked: _Asked) -> _Source:
         file_loads=raw.loads,
         controls=moving.controls if table.move_controls else (),
         counted_controls=moving.counted,
+        raw=raw,
     )
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from fmus.toolchain.cache import CacheError, cache_directory, intact, keep
 from fmus.toolchain.extras import installed_version
+from orchestrator.cases.networks.branch_keys import BranchKey
 from orchestrator.cases.networks.bus_loads import LoadSum
 from orchestrator.cases.networks.element_names import BranchName
 from orchestrator.cases.networks.regions import Region
@@ -43,6 +44,8 @@ class SourceTables:
     # number of a bus whose loads have both signs → those below zero, which the bus' row and its parts hold as well
     feeding: dict[int, LoadSum] = field(default_factory=dict)
     branch_names: tuple[BranchName, ...] = ()  # one for each branch, where the file names them
+    # one for each branch, where another file of the source's program may name it
+    branch_keys: tuple[BranchKey | None, ...] = ()
     unit_names: dict[int, str] = field(
         default_factory=dict
     )  # of the generators at a bus, by its number

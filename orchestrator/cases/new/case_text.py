@@ -9,13 +9,13 @@ from types import MappingProxyType
 
 from fmus.grid.network import Load
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
+from orchestrator.cases.flow.source_impedances import source_impedance
 from orchestrator.cases.form.csv_rows import rows_of
 from orchestrator.cases.networks.data import bus_name
 from orchestrator.cases.networks.record_use import details, in_one_line
 from orchestrator.cases.new.converter_places import ConverterPlace
 from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.cases.scenario.prepare import PreparedScenario
-from orchestrator.cases.scenario.short_circuit import source_impedance
 from orchestrator.core.errors import few
 
 _TEMPLATE = Path(__file__).with_suffix(".txt").read_text(encoding="utf-8")

@@ -1,6 +1,6 @@
 """The network of a scenario: what is read for it, and which network stands behind the grid component."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from fmus.grid.network import Network, Port
@@ -12,6 +12,8 @@ from orchestrator.cases.form.schema import (
     BusFaultTable,
     ComponentTable,
     EventTable,
+    LineFaultTable,
+    LineTripTable,
     ShuntReconnectionTable,
     ShuntTripTable,
 )
@@ -75,7 +77,7 @@ def _name_in_events(draft: Draft, names: ElementNames) -> None:
     lines = [*(x.name for x in draft.data.lines), *(x.name for x in draft.data.transformers)]
 
     def with_identifiers(table: EventTable) -> EventTable:
-        known = {"bus": buses, "line": lines, "cleared_by": lines}
+        known = {"bus": buses, "line": lines, "cleared_by": lines, "at": buses}
         given = {key: getattr(table, key, None) for key in known}
         meant = {
             key: names.identifier(value, known[key], table.place or key)
@@ -142,7 +144,7 @@ def _with_ports(draft: Draft, grid: ComponentTable) -> Network | None:
     ]
     if further:
         network = replace(network, ports=(*network.ports, *further))
-    return _with_switches(network, draft)
+    return _with_switches(network, draft, phasors="phasor" in (grid.model or ""))
 
 
 def _check_buses_have_a_grid(draft: Draft) -> None:
@@ -199,14 +201,14 @@ def _from_table(draft: Draft, grid: ComponentTable, everything: Tables) -> Netwo
             transformers=data.transformers,
             phasors=grid.model == "phasor_grid",
         )
-        return _with_switches(network, draft)
+        return _with_switches(network, draft, phasors=network.phasors)
     except ValueError as error:
         draft.note_network(draft.given.place("network"), str(error))
         return None
 
 
-def _with_switches(network: Network, draft: Draft) -> Network:
-    """The network with the faults and switched shunts of all scenarios, which share one FMU.
+def _with_switches(network: Network, draft: Draft, *, phasors: bool) -> Network:
+    """The network with the faults, switched shunts and ends of lines of all scenarios, which share one FMU.
 
     Unknown names are the events' matter."""
     case = draft.given.case
@@ -221,9 +223,25 @@ def _with_switches(network: Network, draft: Draft) -> Network:
         for table in tables
         if isinstance(table, ShuntTripTable | ShuntReconnectionTable)
     }
+    network = _with_line_parts(network, tables) if phasors else network
     if not (faults or switched):
         return network
     shunts = tuple(replace(shunt, switched=shunt.name in switched) for shunt in network.shunts)
     return replace(
         network, faults=tuple(bus for bus in network.buses if bus in faults), shunts=shunts
     )
+
+
+def _with_line_parts(network: Network, tables: Sequence[EventTable]) -> Network:
+    """The network with lines whose ends switch one by one, and with faults along lines."""
+    faulted = {table.line for table in tables if isinstance(table, LineFaultTable)}
+    ends = {
+        table.line for table in tables if isinstance(table, LineTripTable) and table.at is not None
+    }
+    if not (faulted | ends):
+        return network
+    lines = tuple(
+        replace(line, faulted=line.name in faulted, has_ends=line.name in ends)
+        for line in network.lines
+    )
+    return replace(network, lines=lines, phasors=True)

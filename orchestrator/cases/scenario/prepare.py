@@ -12,6 +12,7 @@ from orchestrator.cases.draft import Draft, DraftInput
 from orchestrator.cases.events.event_tables import scenario_events
 from orchestrator.cases.flow.beside_file import BesideFile, FileVoltages, compare_with_file
 from orchestrator.cases.flow.power_flow import PowerFlow
+from orchestrator.cases.flow.solved_fault import SolvedFault
 from orchestrator.cases.form import component_forms
 from orchestrator.cases.form.build_choices import MODELS, STAND_IN, chosen_parts
 from orchestrator.cases.form.definition import CaseDefinition
@@ -121,6 +122,7 @@ class PreparedScenario:
     idle: Idle = field(default_factory=dict, repr=False)
     changed: str = ""  # what parameter files and the caller set, in few words
     not_reached: tuple[float, ...] = ()  # times of events for which the run stops too early [s]
+    faults: tuple[SolvedFault, ...] = ()  # of fewer phases than three, and poles that open
 
     @cached_property
     def buses_of(self) -> Mapping[str, tuple[str, ...]]:
@@ -296,7 +298,7 @@ class Preparer:
         stop = stop_time if stop_time is not None else draft.given.case.solver.stop_time
         check_length(draft, clock, stop)
         imperfections = disturb_connections(draft, clock, stop) if clock is not None else {}
-        events = scenario_events(draft, clock, stop)
+        events = scenario_events(draft, clock, stop, flow)
         schedule = checked_schedule(draft)
         references = references_of(draft, imperfections)
         if draft.found.problems or clock is None:
@@ -339,6 +341,7 @@ class Preparer:
             network=draft.network,
             places={name: draft.place_of_component(name) for name in plans},
             not_reached=tuple(sorted(draft.found.not_reached)),
+            faults=tuple(draft.found.faults),
             source_slack=draft.data.slack if draft.data else None,
             file_limits=draft.data.limits if draft.data else FileLimits(),
             file_voltages=draft.data.file_voltages if draft.data else FileVoltages(),

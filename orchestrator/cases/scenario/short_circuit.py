@@ -14,11 +14,11 @@ import numpy as np
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.flow.balance import FlowLine
+from orchestrator.cases.flow.source_impedances import source_impedance
 from orchestrator.cases.form.names import close_names
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.scenario.start_values import is_connected
 from orchestrator.core.errors import InputError, few
-from orchestrator.systems.coupling.system import ComponentPlan
 
 CONVENTION = (
     "initial three-phase short circuit from 1 pu (c = 1); machines as R_s + jX''d with their transformer, external "
@@ -176,28 +176,6 @@ class ShortCircuit:
         for bus, source in self.sources.items():
             Y[at[bus], at[bus]] += source
         return Y
-
-
-def source_impedance(plan: ComponentPlan) -> complex | None:
-    """Return the impedance behind a machine or an external grid [pu, 100 MVA]; None for anything else."""
-    known = plan.description.variables
-    scale = SYSTEM_BASE_MVA / plan.number("S_n") if "S_n" in known else 0.0
-    reactance = next((v for v in ("machine.X_d2", "machine.X_d1") if v in known), None)
-    if scale and reactance is not None:
-        data = plan.number("machine.S_data") if "machine.S_data" in known else 0.0
-        on_data = SYSTEM_BASE_MVA / data if data else scale
-        z = on_data * complex(_or_zero(plan, "machine.R_s"), plan.number(reactance))
-        return z + scale * complex(
-            _or_zero(plan, "transformer.R_t"), _or_zero(plan, "transformer.X_t")
-        )
-    if scale and "R_X" in known and "source.E_re" in known:
-        ratio = plan.number("R_X")
-        return scale * complex(ratio, 1.0) / math.hypot(1.0, ratio)
-    return None
-
-
-def _or_zero(plan: ComponentPlan, variable: str) -> float:
-    return plan.number(variable) if variable in plan.description.variables else 0.0
 
 
 def weakest_first(found: Sequence[BusStrength]) -> list[BusStrength]:

@@ -5,7 +5,7 @@ Most come down to variables that are set; faults of connections and components s
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from math import pi, sin
+from math import isfinite, pi, sin
 from typing import Literal
 
 from fmus.grid.names import line_variable
@@ -18,6 +18,9 @@ SMALLEST_FAULT_REACTANCE = 1e-5
 FORCING_POINTS = 200  # values a period by which a forcing follows a sine
 
 ForcingShape = Literal["sine", "square"]
+
+FaultKind = Literal["3-phase", "1-phase", "2-phase", "2-phase-earth"]
+"""Phases of a fault: all three to earth, one to earth, two together, two together and to earth."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +73,18 @@ class LineSwitching(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class LineEndSwitching(Event):
+    """A line is opened at one end, or closed again; from the other end it stays charged."""
+
+    line: str
+    end: Literal["from", "to"]
+    connected: bool
+
+    def settings(self) -> Mapping[str, float | bool]:
+        return {line_variable(self.line, f"{self.end}_connected"): self.connected}
+
+
+@dataclass(frozen=True, slots=True)
 class ShuntSwitching(Event):
     shunt: str
     connected: bool
@@ -108,24 +123,59 @@ class BranchChange(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class PoleSwitching(BranchChange):
+    """One of a line's three phases opens, or closes again: X and R are those of the positive sequence then."""
+
+    open: bool = True
+
+
+@dataclass(frozen=True, slots=True)
 class BusFault(Event):
-    """A three-phase fault of R + jX [pu, 100 MVA] at a bus begins, or ends."""
+    """A fault at a bus begins, or ends.
+
+    R + jX [pu, 100 MVA] is what the positive sequence meets there: of three phases the fault itself, of fewer with the
+    impedances of the other sequences."""
 
     bus: str
     on: bool
     R: float = 0.0
     X: float = 0.0
+    kind: FaultKind = "3-phase"
 
     def settings(self) -> Mapping[str, float | bool]:
-        """The values that the event sets, by variable; X is at least the grid's smallest reactance."""
-        fault = f"{self.bus}.fault"
-        if not self.on:
-            return {f"{fault}.on": False}
-        return {
-            f"{fault}.R": self.R,
-            f"{fault}.X": max(self.X, SMALLEST_FAULT_REACTANCE),
-            f"{fault}.on": True,
-        }
+        """The values that the event sets, by variable."""
+        return _fault_settings(f"{self.bus}.fault", self.on, self.R, self.X)
+
+
+@dataclass(frozen=True, slots=True)
+class LineFault(Event):
+    """A fault along a line begins, or ends, at a part of the way from the from bus; R + jX are as in `BusFault`."""
+
+    line: str
+    at: float
+    on: bool
+    R: float = 0.0
+    X: float = 0.0
+    kind: FaultKind = "3-phase"
+
+    def settings(self) -> Mapping[str, float | bool]:
+        """The values that the event sets, by variable."""
+        values = _fault_settings(line_variable(self.line, "fault"), self.on, self.R, self.X)
+        place = {line_variable(self.line, "fault.at"): self.at}
+        return values | place if self.on else values
+
+
+def _fault_settings(fault: str, on: bool, R: float, X: float) -> dict[str, float | bool]:
+    """Return the values of a fault, by variable; the size of X is at least the grid's smallest reactance."""
+    if not on:
+        return {f"{fault}.on": False}
+    if not isfinite(R):  # no current of another sequence flows, and so none of this one
+        return {f"{fault}.on": False}
+    return {
+        f"{fault}.R": R,
+        f"{fault}.X": X if abs(X) > SMALLEST_FAULT_REACTANCE else SMALLEST_FAULT_REACTANCE,
+        f"{fault}.on": True,
+    }
 
 
 @dataclass(frozen=True, slots=True)

@@ -107,6 +107,7 @@ def _network(
         net.titles,
         {bus: x.feeding for bus, x in at_buses.items() if x.feeding.power},
         tuple(net.names),
+        branch_keys=tuple(net.keys),
         regions=regions_of(net.raw),
     )
     records = record_uses(net.file, net.merged, leaving_out, net.devices.unused, net.dropped)
@@ -120,4 +121,5 @@ def _network(
         loads=tuple(named_loads(net, tables)),
         taps=net.taps,
         shunts=tuple(net.stepping),
+        same=dict(net.same),
     )

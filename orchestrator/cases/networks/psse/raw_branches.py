@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 from itertools import count
 
+from orchestrator.cases.networks.branch_keys import BranchKey
 from orchestrator.cases.networks.element_names import BranchName
 from orchestrator.cases.networks.psse.raw_buses import SWITCH_STATE, reactance_of_switch
 from orchestrator.cases.networks.psse.raw_tables import BUS_COLUMNS, RawTables, is_in_service
@@ -51,7 +52,9 @@ def read_lines(net: RawTables) -> None:
         column = 6 if net.raw.revision < SWITCHING_DEVICES else 7
         rating = record.number(column, "RATEA [MVA]", 0.0)
         name = BranchName(record.text(6, "").strip() if column == 7 else "", circuit)
-        net.add_branch(start, end, z, state, to_earth, rating=rating, name=name)
+        own = net.own_bus(record), net.own_bus(record, 1)
+        key = BranchKey(own, circuit, kilovolts=(one, other))
+        net.add_branch(start, end, z, state, to_earth, rating=rating, name=name, key=key)
     for record in net.raw.of("system switching device"):
         if record.line in net.merged or not is_in_service(record, SWITCH_STATE, "STAT"):
             continue
@@ -137,6 +140,7 @@ def _add_transformer(net: RawTables, t: Transformer) -> None:
             shift=first.shift - second.shift,
             rating=first.rating_mva,
             name=name,
+            key=_key_of(net, t, 0, second.ratio**2),
         )
         seen = net.standing(t.tap.bus) if t.tap else None
         if t.tap and seen is not None and first.bus != second.bus:
@@ -158,7 +162,20 @@ def _add_transformer(net: RawTables, t: Transformer) -> None:
             shift=winding.shift,
             rating=winding.rating_mva,
             name=name,
+            key=_key_of(net, t, k + 1),
         )
+
+
+def _key_of(net: RawTables, t: Transformer, winding: int, square: float = 1.0) -> BranchKey:
+    return BranchKey(
+        t.buses,
+        t.circuit.strip(),
+        is_transformer=True,
+        winding=winding,
+        on_system=t.on_system[max(winding - 1, 0)],
+        square=square,
+        kilovolts=tuple(net.kilovolts.get(w.bus, 0.0) for w in t.windings),
+    )
 
 
 def _corrections_of(net: RawTables, t: Transformer) -> tuple[complex, ...]:

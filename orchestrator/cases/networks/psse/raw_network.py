@@ -99,3 +99,4 @@ class RawNetwork:
     # what holds a voltage step by step: ratios by the row of their branch, and switched shunts
     taps: Mapping[int, TapRecord] = field(default_factory=dict)
     shunts: tuple[ShuntRecord, ...] = ()
+    same: Mapping[int, int] = field(default_factory=dict)  # bus → the one that stands for both

@@ -5,6 +5,7 @@ from typing import Any
 
 from fmus.grid.element_data import SMALLEST_REACTANCE
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
+from orchestrator.cases.networks.branch_keys import BranchKey
 from orchestrator.cases.networks.bus_loads import BusLoads
 from orchestrator.cases.networks.element_names import BranchName
 from orchestrator.cases.networks.psse.controls import ShuntRecord, TapRecord
@@ -44,6 +45,7 @@ class RawTables:
         self.branches: list[list[float]] = []
         self.to_earth: list[tuple[complex, complex]] = []
         self.names: list[BranchName] = []
+        self.keys: list[BranchKey | None] = []
         self.labels: dict[int, str] = {}
         self.titles: dict[int, str] = {}
         # line of the record, X, and kV of each branch
@@ -135,6 +137,7 @@ class RawTables:
         shift: float = 0.0,
         rating: float = 0.0,
         name: BranchName = BranchName(),  # noqa: B008 - frozen
+        key: BranchKey | None = None,
     ) -> None:
         if abs(z.imag) < self.least_reactance:
             text = f"reactance of almost 0: taken as {self.least_reactance:.2g} pu, the least that the network can have"
@@ -148,6 +151,7 @@ class RawTables:
         )
         self.to_earth.append(to_earth)
         self.names.append(name)
+        self.keys.append(key)
 
     def add_within_bus(
         self, bus: int, z: complex, to_earth: tuple[complex, complex], tap: float, shift: float

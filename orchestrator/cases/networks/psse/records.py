@@ -63,7 +63,7 @@ _STRICT_TOKEN = re.compile(
     r"""'((?:[^']|'(?!\s*(?:,|/|$)))*)'?|"((?:[^"]|"(?!\s*(?:,|/|$)))*)"?|(,)|(/)|([^\s,'"/]+)"""
 )
 _BETWEEN_COMMAS = re.compile(r"""[^'"/]*,\s*['"]""")  # begin of a record whose texts stand so
-_BEGIN = re.compile(r"\bBEGIN(?:NING OF)?\s+(.*?)(?:\s+DATA\b.*)?$", re.IGNORECASE)
+BEGIN_OF_SECTION = re.compile(r"\bBEGIN(?:NING OF)?\s+(.*?)(?:\s+DATA\b.*)?$", re.IGNORECASE)
 _RECORD = re.compile(r"""\s*[-'"\d]""")  # begin of a record: a number or a text
 _END = re.compile(r"\bEND OF\s+(.*?)(?:\s+DATA\b.*|,.*)?$", re.IGNORECASE)
 _COMMENT = re.compile(r"\s*(@!|//?(\s|$))")  # begins of a line without data
@@ -129,11 +129,11 @@ class RawFile:
 
 
 def read_records(path: Path) -> RawFile:
-    lines = _numbered(text_of(path))
+    lines = numbered_lines(text_of(path))
     first = next(lines, None)
     if first is None:
         raise InputError(f"{path}: it is empty; export the case from PSS/E as RAW")
-    head = Record(str(path), first[0], _fields(first[1]))
+    head = Record(str(path), first[0], fields_of(first[1]))
     titles = [next(lines, None) for _ in range(2)]
     begin = [line for line in (next(lines, None),) if line is not None]
     lines = chain(begin, lines)
@@ -200,13 +200,13 @@ def _is_bus(line: str) -> bool:
     """Return whether a line of titles is the record of a bus: its number, a name in quotes, and numbers."""
     if not re.match(r"\s*\d+\s*,?\s*['\"]", line):
         return False
-    fields = _fields(line)
+    fields = fields_of(line)
     return len(fields) > 7 and all(is_number(text) for text in fields[2:4])
 
 
 def _is_oldest_bus(line: str) -> bool:
     """Return whether a bus has its kind in the place of its name, and 12 values, as up to revision 23."""
-    fields = _fields(line)
+    fields = fields_of(line)
     return len(fields) == _OLDEST_FIELDS and fields[1] in ("1", "2", "3", "4")
 
 
@@ -229,7 +229,7 @@ def text_of(path: Path) -> str:
     return visible(text)
 
 
-def _numbered(text: str) -> Iterator[tuple[int, str]]:
+def numbered_lines(text: str) -> Iterator[tuple[int, str]]:
     """Lines with their numbers, without those that only comment."""
     yield from (
         (n, line)
@@ -253,10 +253,10 @@ def _sections(
             continue
         if stripped.upper() == "Q":
             return sections, guessed if named else {}
-        if _END_OF_SECTION.match(stripped):
-            named = named or bool(_BEGIN.search(stripped) and name != "system-wide")
+        if END_OF_SECTION.match(stripped):
+            named = named or bool(BEGIN_OF_SECTION.search(stripped) and name != "system-wide")
             name = _following(path, number, stripped, name, order)
-            if not (_BEGIN.search(stripped) or _END.search(stripped)) and name != "end":
+            if not (BEGIN_OF_SECTION.search(stripped) or _END.search(stripped)) and name != "end":
                 guessed[number] = name
         elif name == "end" and not _RECORD.match(line):
             continue  # what a program says behind the last section
@@ -265,7 +265,7 @@ def _sections(
                 f"{path}, line {number}: the line before these data does not say which begin {_REMEDY}"
             )
         else:
-            fields = _fields(line)
+            fields = fields_of(line)
             fields = _without_names(name, fields) if revision >= NAMES else fields
             sections.setdefault(name, []).append(Record(str(path), number, fields))
     if not {"bus", "branch"} <= {*sections} or name in _HEAD:
@@ -273,7 +273,7 @@ def _sections(
     return sections, guessed if named else {}
 
 
-_END_OF_SECTION = re.compile(r"""(0|'\s*0\s*'|"\s*0\s*")\s*(/|$)""")
+END_OF_SECTION = re.compile(r"""(0|'\s*0\s*'|"\s*0\s*")\s*(/|$)""")
 """A 0 in the place of a record's first value; in quotes where that is a name, as programs write it behind DC lines."""
 
 _NAME = {"switched shunt": 12, "induction machine": 8}
@@ -302,7 +302,7 @@ def _following(path: Path, number: int, line: str, name: str, order: list[str]) 
     """The section that begins: the one that the line names, or else the next in the revision's order."""
     found = _END.search(line)
     ended = section_of(found[1]) if found else ""
-    if name == "substation" and not _BEGIN.search(line):
+    if name == "substation" and not BEGIN_OF_SECTION.search(line):
         return name  # each substation has sections of its own
     shunts = ended.endswith("shunt") and name.endswith("shunt")  # either may be called just so
     if ended in order and name in order and ended != name and not shunts:
@@ -310,7 +310,7 @@ def _following(path: Path, number: int, line: str, name: str, order: list[str]) 
             f"{path}, line {number}: it ends the {ended} data, and what stands before it are {name} data by the lines "
             "between sections; one of these is missing or wrong: export the case once more"
         )
-    found = _BEGIN.search(line)
+    found = BEGIN_OF_SECTION.search(line)
     if found:
         return section_of(found[1])
     if name not in order:
@@ -321,7 +321,7 @@ def _following(path: Path, number: int, line: str, name: str, order: list[str]) 
     return order[following] if following < len(order) else "end"
 
 
-def _fields(line: str) -> list[str]:
+def fields_of(line: str) -> list[str]:
     """Fields of a record, separated by commas or blanks; what stands behind a slash is a comment."""
     fields, empty = list[str](), True  # empty: nothing since the last comma
     tokens = _STRICT_TOKEN if _BETWEEN_COMMAS.match(line) else _TOKEN

@@ -52,6 +52,9 @@ class Transformer:
     # whether correction tables act on the impedances between windings, and not on those to the star point (ZCOD = 1)
     corrects_pairs: bool = False
     tap: TapRecord | None = None  # a ratio that holds a voltage in a band, at winding 1 of two
+    buses: tuple[int, ...] = ()  # as the file has them
+    # factors from impedances on the windings' own bases to the system's, in the order of the impedances
+    on_system: tuple[float, ...] = ()
 
 
 def transformers(raw: RawFile, voltages: Mapping[int, float]) -> Iterator[Transformer]:
@@ -97,6 +100,9 @@ def _transformer(
         _impedance(raw, rest[0], 3 * k, codes["CZ"], windings[a].nominal)
         for k, (a, _) in enumerate(pairs)
     )
+    on_system = tuple(
+        _on_system(raw, rest[0], 3 * k, windings[a].nominal) for k, (a, _) in enumerate(pairs)
+    )
     windings_lines = [line for line in rest[1:] if len(line.fields) > 3]
     return Transformer(
         first,
@@ -119,6 +125,8 @@ def _transformer(
         )
         if count == 2
         else None,
+        buses=tuple(buses),
+        on_system=on_system,
     )
 
 
@@ -154,6 +162,12 @@ def _winding(line: Record, bus: int, base: float, code: int, table: int) -> Wind
 def _by_base(code: int, base: float, nominal: float) -> float:
     """Return the factor from a ratio as CW has it to one of the bus' base voltage."""
     return {1: 1.0, 2: 1 / base if base else 0.0, 3: nominal}[code]
+
+
+def _on_system(raw: RawFile, line: Record, index: int, nominal: float) -> float:
+    """Return the factor from an impedance on a pair of windings' own base to the system's; 1 without a base."""
+    base = line.number(index + 2, "SBASE [MVA]", raw.base_mva)
+    return raw.base_mva / base * nominal**2 if base > 0 else 1.0
 
 
 def _impedance(raw: RawFile, line: Record, index: int, code: int, nominal: float) -> complex:

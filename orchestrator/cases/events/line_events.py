@@ -1,0 +1,130 @@
+"""Faults and the opening of lines among a case file's events, and what only networks of phasors can do of them."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from fmus.grid.element_data import Line
+from orchestrator.cases.draft import Draft
+from orchestrator.cases.form import schema
+from orchestrator.systems.coupling import events as coupled
+from orchestrator.systems.coupling.events import Event
+
+_REMEDY = 'write models = "phasor" at the top of the case, or --set models=phasor'
+
+
+def line_events(
+    draft: Draft, table: schema.FaultBase | schema.LineTripTable, grid: str, where: str
+) -> list[Event]:
+    """Return the events of a fault or of a line that opens; none where the network cannot do it, which is noted."""
+    for what in _beyond_transients(table):
+        if not _is_of_phasors(draft, grid):
+            draft.note(
+                where, f"{what} needs a network of phasors, and {grid!r} has transients; {_REMEDY}"
+            )
+            return []
+    match table:
+        case schema.BusFaultTable():
+            return _bus_fault(table, grid)
+        case schema.LineFaultTable():
+            return _line_fault(draft, table, grid, where)
+        case schema.LineTripTable():
+            return _line_trip(draft, table, grid, where)
+        case _:
+            raise TypeError(f"{type(table).__name__} is no event of a line or a fault")
+
+
+def _beyond_transients(table: schema.FaultBase | schema.LineTripTable) -> Iterator[str]:
+    """Yield what of an event EMT networks of ours, which are balanced and have whole lines, cannot do."""
+    if isinstance(table, schema.FaultBase) and table.kind != "3-phase":
+        yield f"a fault of kind {table.kind!r}"
+    if isinstance(table, schema.LineFaultTable):
+        yield "a fault along a line"
+    if isinstance(table, schema.LineTripTable) and table.at is not None:
+        yield "a line that opens at one end"
+
+
+def _is_of_phasors(draft: Draft, grid: str) -> bool:
+    plan = draft.system.components.get(grid)
+    return plan is None or any(name.endswith(".e_re") for name in plan.description.inputs)
+
+
+def _bus_fault(table: schema.BusFaultTable, grid: str) -> list[Event]:
+    begin = coupled.BusFault(
+        table.time, grid, table.bus, True, R=table.R, X=table.X, kind=table.kind
+    )
+    events: list[Event] = [begin]
+    if table.duration is not None:
+        end = table.time + table.duration
+        events.append(coupled.BusFault(end, grid, table.bus, False))
+        if table.cleared_by is not None:
+            events += _opening(end, (grid, table.cleared_by), table.reclose_after)
+    return events
+
+
+def _opening(end: float, line: tuple[str, str], dead: float | None) -> list[Event]:
+    """Return the opening of a line, and its closing after a dead time [s] where there is one."""
+    opened = coupled.LineSwitching(end, *line, False)
+    return [opened] if dead is None else [opened, replace(opened, time=end + dead, connected=True)]
+
+
+def _line_fault(draft: Draft, table: schema.LineFaultTable, grid: str, where: str) -> list[Event]:
+    begin = coupled.LineFault(
+        table.time, grid, table.line, table.at, True, R=table.R, X=table.X, kind=table.kind
+    )
+    events: list[Event] = [begin]
+    if table.duration is None:
+        return events
+    end = table.time + table.duration
+    events.append(coupled.LineFault(end, grid, table.line, table.at, False))
+    closed = None if table.reclose_after is None else end + table.reclose_after
+    if table.opens == "line":
+        events += _opening(end, (grid, table.line), table.reclose_after)
+    elif table.opens == "pole" and closed is not None:
+        events += _pole(draft, table, (grid, where), (end, closed))
+    return events
+
+
+def _pole(
+    draft: Draft, table: schema.LineFaultTable, at: tuple[str, str], times: tuple[float, float]
+) -> list[Event]:
+    """Return the opening and the closing of one phase of a line."""
+    grid, where = at
+    line = _line(draft, table.line)
+    plan = draft.system.components.get(grid)
+    if line is None or plan is None:
+        return []  # that there is no such line is noted with the fault
+    if line.has_ratio:
+        draft.note(
+            where,
+            f"{table.line} has a ratio: one of its phases cannot open alone; write opens = 'line'",
+        )
+        return []
+    X, R = plan.number(line.variable("X")), plan.number(line.variable("R"))
+    return [
+        coupled.PoleSwitching(time, grid, table.line, X, R, open=is_open)
+        for time, is_open in zip(times, (True, False), strict=True)
+    ]
+
+
+def _line_trip(draft: Draft, table: schema.LineTripTable, grid: str, where: str) -> list[Event]:
+    opened: coupled.LineSwitching | coupled.LineEndSwitching
+    opened = coupled.LineSwitching(table.time, grid, table.line, False)
+    line = _line(draft, table.line)
+    if table.at is not None and line is not None:
+        ends = {line.from_bus: "from", line.to_bus: "to"}
+        if table.at not in ends:
+            draft.note(
+                where,
+                f"{table.line} joins {' and '.join(ends)}; at = {table.at!r} must be one of them",
+            )
+            return []
+        end = "from" if ends[table.at] == "from" else "to"
+        opened = coupled.LineEndSwitching(table.time, grid, table.line, end, False)  # type: ignore[arg-type]
+    if table.reclose_after is None:
+        return [opened]
+    return [opened, replace(opened, time=table.time + table.reclose_after, connected=True)]
+
+
+def _line(draft: Draft, name: str) -> Line | None:
+    lines = draft.network.lines if draft.network else ()
+    return next((line for line in lines if line.name == name), None)

@@ -1,0 +1,341 @@
+"""The negative- and the zero-sequence network of a scenario, with what its events have switched until then.
+
+Lines, transformers and shunts are those of the power flow; in the negative sequence they have the impedances of the
+positive one. Loads are impedances there at the voltage of the power flow, and have no path to earth. Capacitors have
+none either. What no file and no key says is taken by a default, and every default that counted is kept for a
+question."""
+
+import math
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from fmus.grid.element_data import Line
+from fmus.grid.network import Network
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
+from orchestrator.cases.draft import Draft
+from orchestrator.cases.flow.balance import FlowLine
+from orchestrator.cases.flow.power_flow import PowerFlow
+from orchestrator.cases.flow.sequence_networks import SequenceNetwork
+from orchestrator.cases.flow.source_impedances import (
+    external_impedance,
+    machine_base,
+    machine_impedance,
+    transformer_impedance,
+)
+from orchestrator.cases.form.schema import SequencesTable
+from orchestrator.cases.networks import sequence_data as usual
+from orchestrator.cases.networks.sequence_data import (
+    DELTA,
+    EARTHED,
+    SequenceData,
+    ZeroLine,
+    ZeroTransformer,
+    windings_of,
+)
+from orchestrator.systems.coupling.system import ComponentPlan
+
+FAULT = "the fault's place"
+"""Bus of a sequence network at a fault along a line."""
+
+
+@dataclass(frozen=True)
+class Changed:
+    """The line of a fault or an open pole: it is split at a part of the way, or its series impedance is open."""
+
+    line: str = ""
+    at: float | None = None
+
+
+@dataclass
+class SequenceAssembly:
+    """Both networks, and which elements had to be taken by a default, by the key of the case that says otherwise."""
+
+    draft: Draft
+    flow: PowerFlow
+    values: Mapping[str, object]
+    changed: Changed = Changed()
+    assumed: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
+    read: set[str] = field(default_factory=set)  # kinds of elements of which the file has data
+    # step-up transformers whose delta is at the network's side, by their file
+    turned: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        network = self.draft.network
+        assert network is not None
+        self.network: Network = network
+        table = self.draft.given.case.network
+        self.table = table.sequences if table else SequencesTable()
+        self.data = (self.draft.data.sequences if self.draft.data else None) or SequenceData()
+        buses = [*self.flow.voltages]
+        if self.changed.at is not None:
+            buses.append(FAULT)
+        self.negative, self.zero = SequenceNetwork(buses), SequenceNetwork([*buses])
+        self._lines = {line.name: line for line in network.lines}
+        for branch in self.flow.lines:
+            self._add_branch(branch)
+        self._couple()
+        self._add_loads_and_shunts()
+        for port in network.ports:
+            plan = self.draft.system.components.get(port.name)
+            if plan is not None and self._holds(f"{port.name}.connected"):
+                self._add_unit(port.name, port.bus, plan)
+
+    def series(self, name: str) -> tuple[complex, complex]:
+        """Return the series impedances of a line in both sequences [pu, 100 MVA]."""
+        branch = next(x for x in self.flow.lines if x.name == name)
+        return self._impedance(branch), self._zero_line(branch, self._lines[name]).z
+
+    def _holds(self, switch: str) -> bool:
+        return bool(self.values.get(switch, True))
+
+    def _impedance(self, branch: FlowLine) -> complex:
+        """Return R + jX of a branch; an event may have changed them."""
+        line = self._lines.get(branch.name)
+        R, X = branch.R, branch.X
+        if line is not None:
+            R = _number(self.values.get(line.variable("R")), R)
+            X = _number(self.values.get(line.variable("X")), X + line.X_C) - line.X_C
+        return complex(R, X)
+
+    def _add_branch(self, branch: FlowLine) -> None:
+        line = self._lines.get(branch.name)
+        if line is None:
+            self._add_leg(branch)
+            return
+        if not self._holds(line.variable("connected")):
+            return
+        closed = tuple(self._holds(line.variable(f"{end}_connected")) for end in ("from", "to"))
+        z, ratio = self._impedance(branch), branch.tap * _turn(-branch.shift)
+        self._add_line(self.negative, branch, z, branch.B, closed, ratio)
+        known = self.data.branches.get(line.name)
+        if known is not None and self._is_turned(line, known):
+            self.turned.append(line.name)
+        if known is None and self._is_transformer(line):
+            known = self._usual_transformer(line, z)
+        if known is not None:
+            self._add_zero_transformer(branch, known)
+            return
+        zero = self._zero_line(branch, line)
+        self._add_line(self.zero, branch, zero.z, zero.b, closed, 1.0)
+        for bus, y in ((branch.from_bus, zero.y_from), (branch.to_bus, zero.y_to)):
+            self.zero.add_to_earth(bus, y)
+
+    def _add_line(
+        self,
+        network: SequenceNetwork,
+        branch: FlowLine,
+        z: complex,
+        B: float,
+        closed: tuple[bool, ...],
+        ratio: complex,
+    ) -> None:
+        """Add a π section, or what of it is still joined to a bus."""
+        half, is_changed = 0.5j * B, branch.name == self.changed.line
+        ends = (branch.from_bus, abs(ratio) ** 2), (branch.to_bus, 1.0)
+        for (bus, square), own, far in zip(ends, closed, reversed(closed), strict=True):
+            if not own:
+                continue
+            network.add_to_earth(bus, half / square)
+            if not far and half:
+                network.add_to_earth(bus, 1 / (z + 1 / half) / square)
+        if not all(closed) or (is_changed and self.changed.at is None):
+            return
+        if is_changed and self.changed.at is not None:
+            at = self.changed.at
+            network.add_series(branch.from_bus, FAULT, at * z, ratio)
+            network.add_series(FAULT, branch.to_bus, (1 - at) * z)
+            return
+        network.add_series(branch.from_bus, branch.to_bus, z, ratio)
+
+    def _zero_line(self, branch: FlowLine, line: Line) -> ZeroLine:
+        known = self.data.lines.get(line.name)
+        if known is not None:
+            self.read.add("lines")
+            return known
+        by_z, by_b = self.table.line_z0, self.table.line_b0
+        if by_z is None:
+            self._assume("line_z0", line.name)
+        return ZeroLine(
+            (by_z or usual.LINE_Z0) * complex(branch.R, branch.X),
+            (usual.LINE_B0 if by_b is None else by_b) * branch.B,
+        )
+
+    def _is_transformer(self, line: Line) -> bool:
+        """Return whether a branch is a transformer: by its file, by the case, or by a ratio or a unit at its end."""
+        if line.name in self.table.groups:
+            return True
+        if self.data.transformers is not None:
+            return line.name in self.data.transformers
+        return line.has_ratio or (not line.B and self._unit_side(line) is not None)
+
+    def _unit_side(self, line: Line) -> int | None:
+        """Return the end, 0 or 1, at which units stand and no other branch; None where there is none."""
+        units = {port.bus for port in self.network.ports}
+        for k, bus in enumerate((line.from_bus, line.to_bus)):
+            others = [x for x in self.network.lines if bus in (x.from_bus, x.to_bus)]
+            if bus in units and len(others) == 1:
+                return k
+        return None
+
+    def _is_turned(self, line: Line, known: ZeroTransformer) -> bool:
+        """Return whether a transformer at a unit has its delta at the network's side and is earthed at the unit's."""
+        side = self._unit_side(line)
+        if side is None or len(known.windings) != 2:
+            return False
+        return known.windings[side] == EARTHED and known.windings[1 - side] == DELTA
+
+    def _usual_transformer(self, line: Line, z: complex) -> ZeroTransformer:
+        """Return a transformer by its vector group in the case, or by the usual one."""
+        z *= self.table.transformer_x0 or usual.TRANSFORMER_X0
+        given = self.table.groups.get(line.name)
+        if given is not None:
+            return ZeroTransformer(windings_of(given), z)
+        side = self._unit_side(line)
+        if side is None:
+            if self.table.transformers is None:
+                self._assume("transformers", line.name)
+            return ZeroTransformer(
+                windings_of(self.table.transformers or usual.NETWORK_TRANSFORMER), z
+            )
+        if self.table.step_up is None:
+            self._assume("step_up", line.name)
+        windings = windings_of(self.table.step_up or usual.STEP_UP)
+        return ZeroTransformer(windings if side == 1 else windings[::-1], z)
+
+    def _add_zero_transformer(self, branch: FlowLine, known: ZeroTransformer) -> None:
+        if branch.name in self.data.branches:
+            self.read.add("transformers")
+        one, other, square = branch.from_bus, branch.to_bus, branch.tap**2
+        if len(known.windings) == 1:  # a leg to the star point of three windings
+            z = known.z + 3 * known.earthing[0] / square
+            if known.windings[0] == EARTHED:
+                self.zero.add_series(one, other, z, branch.tap)
+            elif known.windings[0] == DELTA:
+                self.zero.add_to_earth(other, 1 / z)
+            return
+        first, second = (w == EARTHED for w in known.windings[:2])
+        z_first, z_second = 3 * known.earthing[0] / square, 3 * known.earthing[1]
+        if first and second:
+            self.zero.add_series(one, other, z_first + known.z + z_second, branch.tap)
+        elif first and known.windings[1] == DELTA:
+            self.zero.add_to_earth(one, 1 / (z_first + known.z) / square)
+        elif second and known.windings[0] == DELTA:
+            self.zero.add_to_earth(other, 1 / (known.z + z_second))
+
+    def _add_leg(self, branch: FlowLine) -> None:
+        """Add a leg of a transformer with three windings that is an element of its own."""
+        owner, _, leg = branch.name.partition(".leg_")
+        if not self._holds(f"{owner}.connected"):
+            return
+        z, ratio = complex(branch.R, branch.X), branch.tap * _turn(-branch.shift)
+        self.negative.add_series(branch.from_bus, branch.to_bus, z, ratio)
+        bus, star = branch.from_bus.removeprefix("bus_"), owner.removeprefix("transformer_")
+        known = self.data.branches.get(f"line_{bus}_{star}")
+        if known is None and leg.isdigit():
+            given = self.table.groups.get(owner)
+            if given is None:
+                self._assume("groups", owner)
+            windings = windings_of(given or usual.THREE_WINDINGS)
+            own = windings[int(leg) - 1 : int(leg)] or (DELTA,)
+            known = ZeroTransformer(own, z * (self.table.transformer_x0 or usual.TRANSFORMER_X0))
+        if known is None:  # the part of a leg that carries its ratio
+            self.zero.add_series(branch.from_bus, branch.to_bus, z, branch.tap)
+            return
+        self._add_zero_transformer(branch, known)
+
+    def _couple(self) -> None:
+        """Add the mutual impedances between lines that are whole."""
+        whole = {
+            line.name
+            for line in self.network.lines
+            if line.name != self.changed.line
+            and self._holds(line.variable("connected"))
+            and all(self._holds(line.variable(f"{end}_connected")) for end in ("from", "to"))
+        }
+        pairs = {pair: z for pair, z in self.data.mutuals.items() if set(pair) <= whole}
+        lines = {name: self._lines[name] for pair in pairs for name in pair}
+        own = {name: self.series(name)[1] for name in lines}
+        ends = {name: (line.from_bus, line.to_bus) for name, line in lines.items()}
+        self.zero.couple(ends, own, pairs)
+
+    def _add_loads_and_shunts(self) -> None:
+        for load in self.network.loads:
+            if load.bus in self.data.negative or load.p_mw < 0:
+                continue
+            P = _number(self.values.get(f"{load.name}.P"), load.p_mw)
+            Q = _number(self.values.get(f"{load.name}.Q"), load.q_mvar) if load.q_mvar else 0.0
+            scale = _number(self.values.get(f"{load.name}.scale"), 1.0)
+            square = abs(self.flow.voltages[load.bus]) ** 2
+            self.negative.add_to_earth(load.bus, scale * complex(P, -Q) / SYSTEM_BASE_MVA / square)
+        for shunt in self.network.shunts:
+            if self._holds(f"{shunt.name}.connected"):
+                y = complex(
+                    _number(self.values.get(f"{shunt.name}.G"), shunt.g_mw),
+                    _number(self.values.get(f"{shunt.name}.B"), shunt.b_mvar),
+                )
+                self.negative.add_to_earth(shunt.bus, y / SYSTEM_BASE_MVA)
+        for known, network in (
+            (self.data.negative, self.negative),
+            (self.data.zero, self.zero),
+        ):
+            for bus in (bus for bus in known if bus in self.flow.voltages):
+                network.add_to_earth(bus, known[bus])
+
+    def _add_unit(self, name: str, bus: str, plan: ComponentPlan) -> None:
+        external = external_impedance(plan)
+        machine = machine_impedance(plan)
+        if machine is not None:
+            self._add_machine(name, bus, plan, machine)
+        elif external is not None:
+            self.negative.add_to_earth(bus, 1 / external)
+            if self.table.external_z0 is None:
+                self._assume("external_z0", name)
+            self.zero.add_to_earth(
+                bus, 1 / (external * (self.table.external_z0 or usual.EXTERNAL_Z0))
+            )
+        elif self.table.converter_x2 is None:
+            self._assume("converter_x2", name)
+        else:
+            rating = plan.number("S_n") if "S_n" in plan.description.variables else 0.0
+            self.negative.add_to_earth(
+                bus, rating / SYSTEM_BASE_MVA / (1j * self.table.converter_x2)
+            )
+
+    def _add_machine(self, name: str, bus: str, plan: ComponentPlan, machine: complex) -> None:
+        known, base = self.data.machines.get(name), SYSTEM_BASE_MVA / machine_base(plan)
+        transformer = transformer_impedance(plan)
+        if known is not None and known.negative:
+            negative = base * known.negative
+            self.read.add("machines")
+        else:
+            if self.table.machine_x2 is None:
+                self._assume("machine_x2", name)
+            by = self.table.machine_x2 or usual.MACHINE_X2
+            negative = complex(machine.real, by * machine.imag)
+        self.negative.add_to_earth(bus, 1 / (negative + transformer))
+        if transformer:
+            if self.table.step_up is None:
+                self._assume("step_up", name)
+            if windings_of(self.table.step_up or usual.STEP_UP)[:2] == (EARTHED, DELTA):
+                self.zero.add_to_earth(bus, 1 / transformer)
+            return
+        if known is not None and known.zero is not None:
+            self.zero.add_to_earth(bus, 1 / (base * known.zero))
+        elif known is None and self.table.machine_x0 is not None:
+            self.zero.add_to_earth(bus, 1 / (1j * base * self.table.machine_x0))
+        elif known is None:
+            self._assume("machine_x0", name)
+
+    def _assume(self, key: str, name: str) -> None:
+        if name not in self.assumed[key]:
+            self.assumed[key].append(name)
+
+
+def _number(value: object, otherwise: float) -> float:
+    return float(value) if isinstance(value, int | float) else otherwise
+
+
+def _turn(angle: float) -> complex:
+    """Return e^{j·angle} of an angle [rad]."""
+    return complex(math.cos(angle), math.sin(angle))

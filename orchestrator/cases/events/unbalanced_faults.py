@@ -1,0 +1,221 @@
+"""Faults of fewer than three phases, and poles that open, as what the positive sequence meets.
+
+One phase to earth puts the networks of all three sequences in series, two phases those of the positive and the negative
+one, two phases to earth all three in parallel. The fault is then an impedance to earth in the positive sequence alone:
+
+    1-phase: Z2 + Z0 + 3·Zf    2-phase: Z2 + Zf    2-phase-earth: Z2 ∥ (Z0 + 3·Zf)
+
+with Z2 and Z0 from the fault's place to earth, and Zf the fault's own impedance: of two phases to earth that of the way
+to earth. A phase that opens puts Z2 ∥ Z0 into the line, between both sides of the opening.
+
+Source: C. F. Wagner and R. D. Evans, Symmetrical Components, 1933, chapters III and XIV."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from orchestrator.cases.draft import Draft
+from orchestrator.cases.events.sequence_assembly import FAULT, Changed, SequenceAssembly
+from orchestrator.cases.flow.power_flow import PowerFlow
+from orchestrator.cases.flow.solved_fault import SolvedFault
+from orchestrator.cases.networks import sequence_data as usual
+from orchestrator.core.errors import InputError, Problem, QuestionTopic, counted, few
+from orchestrator.systems.coupling import events as coupled
+from orchestrator.systems.coupling.events import Event, FaultKind
+
+_SHOWN = 4  # elements that a question names
+
+_ASSUMED = {
+    "line_z0": f"the zero-sequence impedance is taken as {usual.LINE_Z0:g} times that of the positive sequence",
+    "transformers": f"the vector group is taken as {usual.NETWORK_TRANSFORMER.upper()}, both neutrals to earth",
+    "step_up": "the step-up transformer is taken as YNd, its neutral to earth on the network's side",
+    "groups": "the vector group of three windings is taken as YNynd",
+    "machine_x2": f"X2 is taken as {usual.MACHINE_X2:g} times X''d",
+    "machine_x0": "the neutral is taken as not earthed",
+    "converter_x2": "taken to feed the positive sequence alone, as a source of current to the negative one",
+    "external_z0": f"the zero-sequence impedance is taken as {usual.EXTERNAL_Z0:g} times that of the positive sequence",
+}
+"""Key of ``[network.sequences]`` → what is taken without it."""
+_EXAMPLES = {
+    "line_z0": "line_z0 = 3.0",
+    "transformers": 'transformers = "YNyn"',
+    "step_up": 'step_up = "YNd"',
+    "groups": 'groups.{} = "YNynd"',
+    "machine_x2": "machine_x2 = 1.0",
+    "machine_x0": "machine_x0 = 0.1",
+    "converter_x2": "converter_x2 = 0.2",
+    "external_z0": "external_z0 = 1.0",
+}
+"""Key → a line of ``[network.sequences]`` that says it."""
+_ONLY_NEGATIVE: tuple[str, ...] = ("machine_x2", "converter_x2")
+
+
+def solve_unbalanced(
+    draft: Draft, flow: PowerFlow | None, events: Sequence[tuple[Event, str]]
+) -> list[tuple[Event, str]]:
+    """Return the events with what the positive sequence meets in each fault of fewer phases and each open pole.
+
+    What was taken without data is asked about; each solution is kept with the draft's findings."""
+    plan = draft.system.components.get(draft.grid or "")
+    if flow is None or plan is None or not any(_is_unbalanced(event) for event, _ in events):
+        return [*events]
+    values: dict[str, object] = {name: plan.value(name) for name in plan.description.parameters}
+    solver = _Solver(draft, flow)
+    found: dict[int, Event] = {}
+    for k in sorted(range(len(events)), key=lambda k: events[k][0].time):
+        event, where = events[k]
+        if _is_unbalanced(event):
+            try:
+                event = solver.solved(event, values, where)
+            except InputError as error:
+                draft.note(where, str(error))
+        found[k] = event
+        values.update(event.changes().get(draft.grid or "", {}))
+    draft.found.questions += solver.questions()
+    return [(found[k], where) for k, (_, where) in enumerate(events)]
+
+
+def _is_unbalanced(event: Event) -> bool:
+    match event:
+        case coupled.BusFault() | coupled.LineFault():
+            return event.on and event.kind != "3-phase"
+        case coupled.PoleSwitching():
+            return event.open
+    return False
+
+
+class _Solver:
+    def __init__(self, draft: Draft, flow: PowerFlow) -> None:
+        self._draft, self._flow = draft, flow
+        self._assumed: dict[str, list[str]] = {}
+        self._asked: list[Problem] = []
+        self._turned: list[str] = []
+        self._where = ""
+
+    def solved(self, event: Event, values: Mapping[str, object], where: str) -> Event:
+        """Return an event with R and X of the positive sequence."""
+        self._where = self._where or where
+        match event:
+            case coupled.BusFault():
+                found = self._assembled(values, Changed(), event.kind)
+                negative, zero = (x.impedance(event.bus) for x in (found.negative, found.zero))
+                z = _met(event.kind, complex(event.R, event.X), negative, zero)
+                self._keep(event, event.bus, event.kind, (negative, zero, z), found)
+                return replace(event, R=z.real, X=z.imag)
+            case coupled.LineFault():
+                found = self._assembled(values, Changed(event.line, event.at), event.kind)
+                negative, zero = (x.impedance(FAULT) for x in (found.negative, found.zero))
+                z = _met(event.kind, complex(event.R, event.X), negative, zero)
+                place = f"{event.line}, {100 * event.at:g} %"
+                self._keep(event, place, event.kind, (negative, zero, z), found)
+                return replace(event, R=z.real, X=z.imag)
+            case coupled.PoleSwitching():
+                return self._open_pole(event, values)
+        return event
+
+    def _open_pole(self, event: coupled.PoleSwitching, values: Mapping[str, object]) -> Event:
+        found = self._assembled(values, Changed(event.line), "1-phase")
+        network = found.network
+        line = next(x for x in network.lines if x.name == event.line)
+        own = found.series(event.line)
+        negative, zero = (
+            z + x.between(line.from_bus, line.to_bus)
+            for z, x in zip(own, (found.negative, found.zero), strict=True)
+        )
+        z = _parallel(negative, zero)
+        self._keep(event, event.line, "open pole", (negative, zero, z), found)
+        if not _is_finite(z):
+            return coupled.LineSwitching(event.time, event.component, event.line, False)
+        return replace(event, R=own[0].real + z.real, X=own[0].imag + line.X_C + z.imag)
+
+    def _assembled(
+        self, values: Mapping[str, object], changed: Changed, kind: FaultKind
+    ) -> SequenceAssembly:
+        found = SequenceAssembly(self._draft, self._flow, dict(values), changed)
+        self._turned += [name for name in found.turned if name not in self._turned]
+        for key, names in found.assumed.items():
+            if kind == "2-phase" and key not in _ONLY_NEGATIVE:
+                continue
+            known = self._assumed.setdefault(key, [])
+            known += [name for name in names if name not in known]
+        return found
+
+    def _keep(
+        self,
+        event: Event,
+        place: str,
+        kind: str,
+        impedances: tuple[complex, complex, complex],
+        found: SequenceAssembly,
+    ) -> None:
+        negative, zero, seen = (z if _is_finite(z) else None for z in impedances)
+        own = complex(getattr(event, "R", 0.0), getattr(event, "X", 0.0))
+        own = 0j if isinstance(event, coupled.PoleSwitching) else own
+        source = found.data.source
+        if source and found.read:
+            source = f"{', '.join(sorted(found.read))} of {source}"
+            source += "; other elements by the case and by defaults" if found.assumed else ""
+        else:
+            source = "ratios of the case and defaults"
+        self._draft.found.faults.append(
+            SolvedFault(
+                event.time,
+                place,
+                kind,
+                own=own,
+                negative=negative,
+                zero=zero,
+                seen=seen,
+                source=source,
+            )
+        )
+        if seen is None and kind != "open pole":
+            lacks = "zero" if negative is not None else "negative"
+            remedy = (
+                "say which neutrals are earthed, such as [network.sequences] "
+                f"{_EXAMPLES['step_up']} or machine_x0 = 0.1"
+                if lacks == "zero"
+                else "a machine or a load there gives it one"
+            )
+            text = (
+                f"no path of the {lacks} sequence leads to earth from {place}: a fault of kind {kind} draws no current "
+                f"there, and the run shows none; {remedy}"
+            )
+            self._asked.append(
+                Problem(self._where, text, topic=QuestionTopic("a fault without a path"))
+            )
+
+    def questions(self) -> Iterator[Problem]:
+        """Yield what was taken by a default, a question for each key that says otherwise, and what draws no current."""
+        yield from self._asked
+        for name in self._turned:
+            text = (
+                f"{name} is at a unit, and its sequence data have the neutral to earth at the unit's side and the "
+                "delta at the network's: are its sides exchanged?"
+            )
+            yield Problem(self._where, text, topic=QuestionTopic("exchanged sides", name))
+        for key, names in self._assumed.items():
+            said = _EXAMPLES[key].format(names[0])
+            text = (
+                f"{_ASSUMED[key]} ({counted(len(names), 'element')}: {few(names, _SHOWN)}); if it is another, give "
+                f"a SEQ file, or write [network.sequences] {said}"
+            )
+            yield Problem(self._where, text, topic=QuestionTopic(f"sequence data: {key}"))
+
+
+def _met(kind: FaultKind, own: complex, negative: complex, zero: complex) -> complex:
+    """Return the impedance that the positive sequence meets at a fault [pu, 100 MVA]."""
+    if kind == "2-phase":
+        return negative + own
+    if kind == "1-phase":
+        return negative + zero + 3 * own
+    return _parallel(negative, zero + 3 * own)
+
+
+def _parallel(one: complex, other: complex) -> complex:
+    if not _is_finite(one) or not _is_finite(other):
+        return other if not _is_finite(one) else one
+    return one * other / (one + other)
+
+
+def _is_finite(z: complex) -> bool:
+    return abs(z) != float("inf")

@@ -1,0 +1,255 @@
+"""Sequence data of PSS/E: the impedances of the WSCC system by hand, and what a file of another case is told."""
+
+import numpy as np
+import pytest
+
+from orchestrator.cases.case import load_case
+from orchestrator.core.errors import CaseError
+from tests.cases.networks.psse import LINES, LOADS, REACTANCES, TRANSFORMERS, raw
+
+DYR = "\n".join(f"{n} 'GENCLS' 1 {h} 0.0 /" for n, h in ((1, 9.55), (2, 3.33), (3, 2.35)))
+BASES = {1: 247.5, 2: 192.0, 3: 128.0}
+X2 = {1: 0.13, 2: 0.22, 3: 0.21}
+CASE = """\
+name = "wscc"
+models = "phasor"
+[solver]
+step_size = "1 ms"
+stop_time = "2 s"
+[power_flow]
+grid = "grid"
+[components.grid]
+model = "grid"
+[network]
+raw = "grid.raw"
+{seq}
+[units]
+dyr = "grid.dyr"
+generator = "synchronous_generator"
+converter = "gfor"
+generator_parameters = {{ transformer.X_t = 0.0, transformer.R_t = 0.0 }}
+[[events]]
+type = "bus_fault"
+time = "1 s"
+{fault}
+duration = "100 ms"
+"""
+NO_LOADS = [f"{n},'1 ',0,0,0,0,0" for n in LOADS]
+PATH_AT_9 = (0.02, 0.3)
+"""R and X of the neutral of machine 3's transformer [pu, 100 MVA]."""
+
+
+def zero_of(line):
+    """Zero-sequence impedance and charging that the tests' files give a line."""
+    *_, r, x, b = line
+    return 4 * r + 2.5j * x, 0.6 * b
+
+
+def transformers(coded):
+    """Records of the transformers: two YNd with the network's side first, one with an impedance at its neutral."""
+    found = []
+    for i, j, x in TRANSFORMERS:
+        r_g, x_g = PATH_AT_9 if j == 3 else (0.0, 0.0)
+        z = f"0.0,{0.9 * x}"
+        if coded:
+            found.append(f"{i},{j},0,'1 ',1,1,12,{r_g},{x_g},{z},0,0,0,0,0,0")
+        else:
+            found.append(f"{i},{j},0,'1 ',2,{r_g},{x_g},{z},0,0")
+    return found
+
+
+def branches(lines=LINES):
+    found = []
+    for line in lines:
+        z, b = zero_of(line)
+        found.append(f"{line[0]},{line[1]},'1 ',{z.real},{z.imag},{b},0,0,0,0")
+    return found
+
+
+def seq(machines=None, lines=LINES, of_transformers=None, mutual=(), revision=33):
+    """Text of a file with one section for the machines."""
+    machines = machines or [
+        f"{n},'1 ',0,{REACTANCES[n]},0.3,1.0,0,{X2[n]},0,0.05,1,0,0,0" for n in X2
+    ]
+    parts = [
+        ("GENERATOR", machines),
+        ("LOAD", NO_LOADS),
+        ("ZERO SEQ. NON-TRANSFORMER BRANCH", branches(lines)),
+        ("ZERO SEQ. MUTUAL", mutual),
+        (
+            "ZERO SEQ. TRANSFORMER",
+            transformers(True) if of_transformers is None else of_transformers,
+        ),
+        ("ZERO SEQ. SWITCHED SHUNT", ()),
+        ("ZERO SEQ. FIXED SHUNT", ()),
+    ]
+    text = [f"0,{revision} / SEQ"]
+    if revision > 34:
+        text += ["RPTFORMAT, AMPOUT=0", "0 / END OF SYSTEM-WIDE DATA, BEGIN GENERATOR DATA"]
+    following = [name for name, _ in parts[1:]] + [""]
+    for (name, records), after in zip(parts, following, strict=True):
+        text += [*records, f"0 / END OF {name} DATA" + (f", BEGIN {after} DATA" if after else "")]
+    return "\n".join([*text, "Q", ""])
+
+
+def old_seq():
+    """The same in revision 30: each sequence of the machines is a section, and nothing is coded."""
+    machines = [
+        [f"{n},'1 ',0,{data[n]}" for n in X2] for data in (REACTANCES, X2, dict.fromkeys(X2, 0.05))
+    ]
+    sections = [*machines, [], [], branches(), [], transformers(False), [], []]
+    return "\n".join(["0,30 / SEQ", *(x for rows in sections for x in [*rows, "0 /"]), ""])
+
+
+@pytest.fixture
+def prepared(tmp_path):
+    def prepare(text=None, fault='bus = "bus_5"\nkind = "1-phase"', more=""):
+        (tmp_path / "grid.raw").write_text(raw())
+        (tmp_path / "grid.dyr").write_text(DYR)
+        if text is not None:
+            (tmp_path / "grid.seq").write_text(text)
+        key = "" if text is None else 'seq = "grid.seq"'
+        case = CASE.format(seq=f"{key}\n{more}", fault=fault)
+        (tmp_path / "case.toml").write_text(case)
+        return load_case(tmp_path / "case.toml").prepare()[0]
+
+    return prepare
+
+
+def by_hand(flow, bus, coupled=0.0):
+    """Z2 and Z0 at a bus, from dense matrices."""
+    Y = np.zeros((2, 9, 9), dtype=complex)
+
+    def series(k, i, j, y):
+        for a, b, sign in ((i, i, 1), (j, j, 1), (i, j, -1), (j, i, -1)):
+            Y[k, a - 1, b - 1] += sign * y
+
+    for line in LINES:
+        i, j, r, x, b = line
+        z, b_0 = zero_of(line)
+        series(0, i, j, 1 / complex(r, x))
+        series(1, i, j, 1 / z)
+        for k, charging in ((0, b), (1, b_0)):
+            for end in (i, j):
+                Y[k, end - 1, end - 1] += 0.5j * charging
+    for i, j, x in TRANSFORMERS:
+        series(0, i, j, 1 / (1j * x))
+        earthing = 3 * complex(*PATH_AT_9) if j == 3 else 0
+        Y[1, i - 1, i - 1] += 1 / (0.9j * x + earthing)
+    for n, x in X2.items():
+        Y[0, n - 1, n - 1] += BASES[n] / 100 / (1j * x)
+        Y[1, n - 1, n - 1] += BASES[n] / 100 / 0.05j
+    for n, (p, q) in LOADS.items():
+        Y[0, n - 1, n - 1] += complex(p, -q) / 100 / abs(flow.voltages[f"bus_{n}"]) ** 2
+    if coupled:
+        pair = [line for line in LINES if line[:2] in ((4, 5), (4, 6))]
+        own = np.diag([zero_of(line)[0] for line in pair])
+        change = np.linalg.inv(own + coupled * (1 - np.eye(2))) - np.linalg.inv(own)
+        incidence = np.zeros((2, 9))
+        for k, line in enumerate(pair):
+            incidence[k, line[0] - 1], incidence[k, line[1] - 1] = 1, -1
+        Y[1] += incidence.T @ change @ incidence
+    return [np.linalg.inv(Y[k])[bus - 1, bus - 1] for k in range(2)]
+
+
+@pytest.mark.parametrize("text", [seq(), seq(revision=35), old_seq()], ids=["33", "35", "30"])
+def test_the_impedances_are_those_by_hand(text, prepared):
+    ready = prepared(text)
+    (found,) = ready.faults
+    negative, zero = by_hand(ready.power_flow, 5)
+    assert found.negative == pytest.approx(negative, rel=1e-9)
+    assert found.zero == pytest.approx(zero, rel=1e-9)
+    assert found.seen == pytest.approx(negative + zero, rel=1e-9)
+    assert "grid.seq" in found.source
+    assert not [q for q in ready.questions if "[network.sequences]" in str(q)]
+    unused = [x.kind for x in ready.records if "sequence" in x.kind and x.use == "not used"]
+    assert set(unused) <= {"positive machine (sequence data)"}
+
+
+def test_mutual_impedances_count(prepared):
+    mutual = ["4,5,'1 ',6,4,'1 ',0.0,-0.1,0,1,0,1"]  # the second line the other way round
+    ready = prepared(seq(mutual=mutual))
+    _, zero = by_hand(ready.power_flow, 5, coupled=0.1j)
+    assert ready.faults[0].zero == pytest.approx(zero, rel=1e-9)
+    assert zero != pytest.approx(by_hand(ready.power_flow, 5)[1], rel=1e-3)
+
+
+def told(ready, words):
+    return [str(q) for q in ready.questions if words in str(q)]
+
+
+def test_a_file_of_another_case_is_asked_about(prepared):
+    foreign = [f"{n + 100},'1 ',0,0.2,0.3,1.0,0,0.2,0,0.05,1,0,0,0" for n in X2]
+    ready = prepared(seq(machines=foreign))
+    (text,) = told(ready, "is the file of another case?")
+    assert "3 records of sequence data are of buses that the network's file lacks" in text
+    assert "line 2 bus 101" in text
+    assert told(ready, "X2 is taken as 1 times X''d (3 elements")
+    unused = [x for x in ready.records if "no bus 101" in x.why]
+    assert [x.kind for x in unused] == ["machine (sequence data)"]
+
+
+def test_a_line_without_data_is_asked_about(prepared):
+    ready = prepared(seq(lines=LINES[1:]))
+    (text,) = told(ready, "3 times that of the positive sequence")
+    assert "(1 element: line_4_5)" in text
+
+
+def test_exchanged_sides_of_transformers_change_the_impedance_and_are_asked_about(prepared):
+    turned = [x.replace(",12,", ",13,") for x in transformers(True)]
+    ready = prepared(seq(of_transformers=turned))
+    assert ready.faults[0].zero.imag < 0  # only charging is left
+    text = " ".join(told(ready, "are its sides exchanged?"))
+    assert "line_4_1" in text
+
+
+def test_an_order_of_buses_that_is_another_is_asked_about(prepared):
+    rows = [f"{j},{i},0,'1 ',1,1,13,0,0,0.0,{0.9 * x},0,0,0,0,0,0" for i, j, x in TRANSFORMERS]
+    ready = prepared(seq(of_transformers=rows))
+    assert len(told(ready, "stand in another order than in the network's file")) == 3
+
+
+def test_a_base_that_is_another_is_asked_about(prepared):
+    lines = [(i, j, 100 * r, 100 * x, b) for i, j, r, x, b in LINES]
+    assert told(prepared(seq(lines=lines)), "Z0 by Z1 of lines is 25")
+    machines = [f"{n},'1 ',0,{REACTANCES[n]},0.3,1.0,0,{X2[n] / 10},0,0.05,1,0,0,0" for n in X2]
+    assert told(prepared(seq(machines=machines)), "X2 by X'' of machines (ZX of RAW) is 0.1")
+
+
+def test_no_path_to_earth_means_no_current_and_is_told(prepared):
+    ready = prepared(fault='bus = "bus_2"\nkind = "1-phase"')  # behind the delta of its transformer
+    (found,) = ready.faults
+    assert found.zero is None
+    assert found.seen is None
+    assert ready.events[0].settings() == {"bus_2.fault.on": False}
+    (text,) = told(ready, "no path of the zero sequence leads to earth from bus_2")
+    assert "draws no current there" in text
+    both = prepared(fault='bus = "bus_2"\nkind = "2-phase-earth"').faults[0]
+    assert both.seen == both.negative
+
+
+def test_ratios_of_the_case_are_no_questions(prepared):
+    more = (
+        "[network.sequences]\nline_z0 = 3.0\nline_b0 = 0.6\nstep_up = 'YNd'\nmachine_x2 = 1.0\n"
+        "machine_x0 = 0.05\n"
+    )
+    asked = prepared()
+    assert len(told(asked, "[network.sequences]")) == 4
+    stated = prepared(more=more)
+    assert not told(stated, "[network.sequences]")
+    assert stated.faults[0].negative == pytest.approx(asked.faults[0].negative)
+    assert stated.faults[0].source == "ratios of the case and defaults"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "it is empty"),
+        ("7,33\n", "IC is 7: sequence data begin with IC and REV"),
+        ("0,33\n0 / END OF X DATA, BEGIN BUS DATA\n", "'BUS' is no section of sequence data"),
+        (seq().replace("0.13", "x", 1), "ZXNEGDV is 'x'; it must be a number"),
+    ],
+)
+def test_what_is_no_sequence_data_is_refused_by_line(text, words, prepared):
+    with pytest.raises(CaseError, match=words):
+        prepared(text)
