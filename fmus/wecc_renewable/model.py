@@ -1,28 +1,30 @@
-"""A wind, solar or battery plant of WECC's generic models, phasor type: REGCA1 with REECA1 or REECB1, and REPCA1.
+"""A wind, solar or battery plant of WECC's generic models, phasor type: converter, control, and what sets references.
 
-The current follows the angle of the terminal voltage at once, as in the specifications: there is no PLL. Its emf is
-the voltage that this current gives behind a reactance of the port, with an extrapolated terminal voltage."""
+The current follows the angle of the terminal voltage at once, as in the specifications of REGCA1 and REGCB1: there is
+no PLL. The emf of REGCA1 is the voltage that its current gives behind a reactance of the port, with an extrapolated
+terminal voltage."""
 
 from dataclasses import dataclass
 
 from fmus.converter_parts.bus_voltage import ExtrapolatedVoltage, extrapolated_voltage
-from fmus.toolchain.frames import Phasor, power
+from fmus.toolchain.frames import power
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.phasor_port import (
-    SourceEmf,
-    declare_master_step,
-    declare_phasor_outputs,
-    motion,
-    phasor_builder,
-)
-from fmus.toolchain.port import DevicePort, device_port
-from fmus.toolchain.symbols import Expr, fmax
+from fmus.toolchain.phasor_port import declare_master_step, declare_phasor_outputs, phasor_builder
+from fmus.toolchain.port import DevicePort, declare_rating, device_port_of
+from fmus.toolchain.symbols import Expr
 from fmus.toolchain.variables import usual_beside
-from fmus.wecc_renewable.electrical import Electrical, commands, declare_electrical
-from fmus.wecc_renewable.injection import Injection, declare_injection
+from fmus.wecc_renewable.converters import REGCA1, Converter, Kind
+from fmus.wecc_renewable.electrical import (
+    Electrical,
+    Reeca1,
+    commands,
+    declare_electrical,
+    in_dip,
+)
 from fmus.wecc_renewable.plant import Measured, measured_elsewhere, plant_references
-from fmus.wecc_renewable.signals import LEAST_VOLTAGE, References, Terminal
+from fmus.wecc_renewable.signals import References, Terminal
+from fmus.wecc_renewable.turbine import Turbine, TurbineParts
 
 S_N = 100.0  # default rating [MVA]: the base of networks
 P_0 = 0.8  # default power [pu, S_n]
@@ -30,28 +32,38 @@ USUAL = usual_beside(__file__)
 
 
 @dataclass(frozen=True)
+class Makeup:
+    """The parts of a plant: converter, control, the plant's controller and where it measures, and a turbine."""
+
+    converter: Kind = REGCA1
+    control: type[Reeca1] = Reeca1
+    has_plant: bool = False
+    measures_elsewhere: bool = False
+    turbine: TurbineParts | None = None
+
+
+@dataclass(frozen=True)
 class _Plant:
-    """A plant's converter and electrical control, before its references are known."""
+    """A plant's converter, electrical control and turbine, before its references are known."""
 
     port: DevicePort
     seen: ExtrapolatedVoltage
-    injection: Injection
+    converter: Converter
     terminal: Terminal
+    turbine: Turbine | None
     electrical: Electrical
 
 
 def regca1_phasor() -> Model:
     """REGCA1 with REECA1 or REECB1, with constant references."""
     title = "Plant of REGCA1 with REECA1 or REECB1 (phasor type)"
-    m = phasor_builder("regca1_phasor", title, kind="converter", usual=USUAL)
-    return _closed(m, with_plant=False)
+    return composed("regca1_phasor", title, Makeup())
 
 
 def regca1_repca1_phasor() -> Model:
     """REGCA1 with REECA1 or REECB1, behind the plant's controller REPCA1."""
     title = "Plant of REGCA1 with REECA1 or REECB1 and REPCA1 (phasor type)"
-    m = phasor_builder("regca1_repca1_phasor", title, kind="converter", usual=USUAL)
-    return _closed(m, with_plant=True)
+    return composed("regca1_repca1_phasor", title, Makeup(has_plant=True))
 
 
 def regca1_repca1_remote_phasor() -> Model:
@@ -59,79 +71,91 @@ def regca1_repca1_remote_phasor() -> Model:
     title = (
         "Plant of REGCA1 with REECA1 or REECB1 and a REPCA1 that measures elsewhere (phasor type)"
     )
-    m = phasor_builder("regca1_repca1_remote_phasor", title, kind="converter", usual=USUAL)
-    return _closed(m, with_plant=True, measures_elsewhere=True)
+    makeup = Makeup(has_plant=True, measures_elsewhere=True)
+    return composed("regca1_repca1_remote_phasor", title, makeup)
 
 
-def _closed(m: ModelBuilder, *, with_plant: bool, measures_elsewhere: bool = False) -> Model:
-    port = device_port(m, S_n=S_N, P_0=P_0)
-    text = (
-        "Reactance of the port, across which the current is fed; it changes nothing in steady state"
-    )
-    X = m.parameter("X_port", 2.0, "pu", text, base="S_n", minimum=0.01, source="chosen here")
-    R = m.parameter("R_port", 0.0, "pu", "Resistance of the port", base="S_n", minimum=0.0)
-    Z = Phasor(R, X)
+def composed(name: str, title: str, makeup: Makeup) -> Model:
+    """The plant of a makeup."""
+    m = phasor_builder(name, title, kind="converter", usual=USUAL)
+    S_n = declare_rating(m, S_N)
+    port = device_port_of(m, S_n, P_0)
+    Z = makeup.converter.impedance(m)
     master = declare_master_step(m)
     seen = extrapolated_voltage(m, port, master)
     seen.follow(m, port.v)
-    plant = _declared(m, port, seen)
+    converter = makeup.converter.converter(m, port, seen, Z)
+    plant = _declared(m, port, seen, converter, makeup, S_n)
+    turbine, t = plant.turbine, plant.terminal
+    own = plant.electrical.references
+    start = own if turbine is None else References(turbine.reference_0(own.P, t), own.Q)
     references = (
-        _references_of_plant(m, plant, measures_elsewhere=measures_elsewhere)
-        if with_plant
-        else _constant_references(m, plant)
+        _references_of_plant(m, plant, start, measures_elsewhere=makeup.measures_elsewhere)
+        if makeup.has_plant
+        else _constant_references(m, start)
     )
+    asked = references.P
+    if turbine is not None:
+        asked = turbine.reference(m, t, asked, own.P, in_dip(t, plant.electrical))
     with m.scope("electrical"):
-        active, reactive = commands(m, plant.terminal, plant.electrical, references)
-    plant.injection.follow(m, active, reactive)
-    fed = Phasor(plant.injection.active, -plant.injection.reactive)
-    at_start = power(port.v_0, port.i_0) / port.v_0.magnitude()
-    with m.scope("source"):
-        moving = motion(m, "i", fed, at_start.conjugate(), "Current at the voltage's angle")
-
-    def emf(time: Expr) -> Phasor:
-        v = seen.after(time)
-        return v + Z * _turned(fed + moving * time, v)
-
-    source = SourceEmf(behind=emf(-master.size / 2), ahead=emf(master.to_next))
-    declare_phasor_outputs(m, port, source, Z)
+        speed = None if turbine is None else turbine.speed
+        found = commands(m, t, plant.electrical, References(asked, references.Q), speed)
+    if turbine is not None:
+        beyond = found.power - plant.electrical.power_0 - (references.P - start.P)
+        turbine.close(m, t, beyond)
+    plant.converter.follow(m, found.active, found.reactive)
+    declare_phasor_outputs(m, port, plant.converter.emf(m, master), Z)
+    active, reactive = plant.converter.fed()
     m.output("V", seen.value.magnitude(), "pu", "Voltage magnitude at the terminal", base="bus")
-    m.output("I_p_fed", plant.injection.active, "pu", "Active current", base="S_n")
-    m.output("I_q_fed", plant.injection.reactive, "pu", "Reactive current", base="S_n")
-    m.output("I_p_command", active, "pu", "Command of active current", base="S_n")
-    m.output("I_q_command", reactive, "pu", "Command of reactive current", base="S_n")
+    m.output("I_p_fed", active, "pu", "Active current", base="S_n")
+    m.output("I_q_fed", reactive, "pu", "Reactive current", base="S_n")
+    m.output("I_p_command", found.active, "pu", "Command of active current", base="S_n")
+    m.output("I_q_command", found.reactive, "pu", "Command of reactive current", base="S_n")
+    if turbine is not None:
+        turbine.declare_outputs(m)
     return m.build()
 
 
-def _turned(current: Phasor, v: Phasor) -> Phasor:
-    """A current at a voltage's angle, in the network frame."""
-    return current * v / fmax(v.magnitude(), LEAST_VOLTAGE)
-
-
-def _declared(m: ModelBuilder, port: DevicePort, seen: ExtrapolatedVoltage) -> _Plant:
+def _declared(
+    m: ModelBuilder,
+    port: DevicePort,
+    seen: ExtrapolatedVoltage,
+    converter: Converter,
+    makeup: Makeup,
+    rating: Expr,
+) -> _Plant:
     v = seen.value
-    size, size_0, s_0 = v.magnitude(), port.v_0.magnitude(), power(port.v_0, port.i_0)
-    injection = declare_injection(m, size, size_0, s_0.re, s_0.im)
-    i = _turned(Phasor(injection.active, -injection.reactive), v) * port.connected
-    s = power(v, i)
+    s_0, s = power(port.v_0, port.i_0), power(v, converter.current)
     terminal = Terminal(
         v=v,
-        i=i,
-        size=size,
+        i=converter.current,
+        size=v.magnitude(),
         P=Expr(s.re),
         Q=Expr(s.im),
         v_0=port.v_0,
         i_0=port.i_0,
-        size_0=size_0,
+        size_0=port.v_0.magnitude(),
         P_0=s_0.re,
         Q_0=s_0.im,
     )
+    parts = makeup.turbine
+    turbine = None if parts is None else Turbine(m, terminal, parts, rating)
     with m.scope("electrical"):
-        electrical = declare_electrical(m, terminal, injection.active_0, injection.reactive_0)
-    return _Plant(port, seen, injection, terminal, electrical)
+        electrical = declare_electrical(
+            m,
+            makeup.control(),
+            terminal,
+            converter.active_0,
+            converter.reactive_0,
+            None if turbine is None else turbine.speed_0,
+        )
+    return _Plant(port, seen, converter, terminal, turbine, electrical)
 
 
-def _references_of_plant(m: ModelBuilder, plant: _Plant, *, measures_elsewhere: bool) -> References:
-    t, start = plant.terminal, plant.electrical.references
+def _references_of_plant(
+    m: ModelBuilder, plant: _Plant, start: References, *, measures_elsewhere: bool
+) -> References:
+    t = plant.terminal
     with m.scope("plant"):
         point = (
             measured_elsewhere(m, plant.port.current_scale)
@@ -141,8 +165,7 @@ def _references_of_plant(m: ModelBuilder, plant: _Plant, *, measures_elsewhere: 
         return plant_references(m, point, plant.seen, plant.port.omega_b, start)
 
 
-def _constant_references(m: ModelBuilder, plant: _Plant) -> References:
-    start = plant.electrical.references
+def _constant_references(m: ModelBuilder, start: References) -> References:
     change_P = m.parameter(
         "delta_Pref", 0, "pu", "Change of the active power's reference", base="S_n", tunable=True
     )

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import pairwise
 
 from fmus.toolchain.blocks import BYPASS_TIME, RETURN_TIME, clamp, held_at_limits
@@ -45,6 +46,11 @@ class References:
     Q: Expr
 
 
+def turned(current: Phasor, v: Phasor) -> Phasor:
+    """A current at a voltage's angle, in the network frame."""
+    return current * v / fmax(v.magnitude(), LEAST_VOLTAGE)
+
+
 def dead_band(u: Expr, low: Scalar, high: Scalar) -> Expr:
     """Return the part of a signal that lies beyond a band around 0; continuous at its ends.
 
@@ -59,6 +65,22 @@ def through_points(x: Expr, points: Sequence[tuple[Scalar, Scalar]]) -> Expr:
         steep = (y_2 - y_1) / fmax(Expr(x_2) - x_1, 1e-9)
         y = if_else(x < x_2, y_1 + steep * (x - x_1), y)
     return if_else(x < points[0][0], points[0][1], y)
+
+
+def through_rising_points(x: Expr, points: Sequence[tuple[Expr, Expr]]) -> Expr:
+    """`through_points` of a table whose points count as far as x rises: files fill the rest with zeros."""
+    counted = [points[0]]
+    rises = Expr(1)
+    for (before, _), (at, value) in pairwise(points):
+        rises = logic_and(rises, at > before)
+        last_x, last_y = counted[-1]
+        counted.append((if_else(rises, at, last_x), if_else(rises, value, last_y)))
+    return through_points(x, counted)
+
+
+def highest(values: Sequence[Expr]) -> Expr:
+    """The largest of some values."""
+    return reduce(fmax, values)
 
 
 def frozen_lag(

@@ -67,6 +67,14 @@ MODELS = {
         f"machine {name}": partial(of_catalogue, "synchronous_generator_phasor", machine=name)
         for name in MACHINES
     },
+    **{
+        f"plant {records}": partial(of_catalogue, "wecc_plant_phasor", records=records)
+        for records in (
+            "REGCC1 REECC1 REPCA1",
+            "REGCB1 REECD1 REPCA1 elsewhere",
+            "REGCA1 REECA1 WTDTA1 WTARA1 WTPTA1 WTTQA1",
+        )
+    },
     **{f"exciter {name}": partial(exciter, name) for name in EXCITERS},
     **{f"governor {name}": partial(governor, name) for name in GOVERNORS},
     **{

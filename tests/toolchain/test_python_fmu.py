@@ -67,6 +67,7 @@ ALL_PATHS_OPEN = {
     "static_generation_phasor": {"communication_step": 5e-3, "R": 0.01},
     "csvgn1_phasor": {"communication_step": 5e-3, "R": 0.01},
     "regca1_phasor": _PLANT_OPEN,
+    "wecc_plant_phasor": {"communication_step": 5e-3, "Re": 0.01},
     "regca1_repca1_phasor": _PLANT_OPEN,
     "regca1_repca1_remote_phasor": _PLANT_OPEN,
     "regfm_a1_phasor": {

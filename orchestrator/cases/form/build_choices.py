@@ -1,8 +1,9 @@
 """Choices of what a scenario is built of; a case file, a parameter file and ``--set`` write them among the values.
 
 ``<component>.native`` chooses the kind of FMU, ``<component>.exciter`` and the other `PARTS` what a generator is made
-of, ``units.alpha`` the converters' share of the units. No FMU has such a variable. They are taken out where a layer of
-values is made, and the preparation reads them before it knows the FMUs."""
+of, ``<component>.records`` what a plant of WECC's generic models is made of, ``units.alpha`` the converters' share of
+the units. No FMU has such a variable. They are taken out where a layer of values is made, and the preparation reads
+them before it knows the FMUs."""
 
 import fnmatch
 from collections.abc import Callable, Mapping
@@ -18,10 +19,16 @@ _NATIVE = "native"
 PARTS = ("machine", "exciter", "governor", "stabilizer")
 """Keys of a component's table, of ``[units]`` and columns of its file that choose the parts of a generator."""
 
+RECORDS = "records"
+"""Key of a component's table that names PSS/E's records of which a plant of WECC's generic models is made."""
+
+CHOICES = (*PARTS, RECORDS)
+"""Keys of a component's table that choose what its model is made of."""
+
 
 def chosen_parts(source: object) -> dict[str, str]:
     """Return the parts that a table or a command's options choose, by their keys."""
-    choices = {part: getattr(source, part) for part in PARTS}
+    choices = {part: getattr(source, part, None) for part in CHOICES}
     return {part: name for part, name in choices.items() if name is not None}
 
 
@@ -50,7 +57,7 @@ class NativeChoice:
 @dataclass(frozen=True)
 class PartChoice:
     pattern: str  # name of a component, or a pattern such as ``g*``
-    part: str  # one of `PARTS`
+    part: str  # one of `CHOICES`
     given: Value
     place: str
 
@@ -106,7 +113,7 @@ def layer_of(given: Mapping[str, Value], place: Place, *, has_units: bool) -> La
             shares.append(ShareChoice(key.removeprefix(ALPHA).removeprefix("."), value, place(key)))
         elif variable == _NATIVE:
             natives.append(NativeChoice(pattern, value, place(key)))
-        elif variable in PARTS:
+        elif variable in CHOICES:
             parts.append(PartChoice(pattern, variable, value, place(key)))
         else:
             values[key] = value

@@ -91,6 +91,7 @@ class ComponentTable(Table):
     exciter: str | None = None
     governor: str | None = None
     stabilizer: str | None = None
+    records: str | None = None
     parameters: dict[str, Any] = {}
     inputs: dict[str, Any] = {}
 

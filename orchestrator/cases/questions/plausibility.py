@@ -13,7 +13,7 @@ from itertools import product
 from fmus.synchronous_generator.conversion import LEAST_LEAKAGE
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.flow.power_flow import PowerFlow
-from orchestrator.cases.form.build_choices import PARTS
+from orchestrator.cases.form.build_choices import CHOICES
 from orchestrator.cases.form.names import close_names
 from orchestrator.cases.form.unusual_value import UnusualValue
 from orchestrator.cases.questions.plausible_networks import network_doubts
@@ -186,7 +186,7 @@ def _check_meant(draft: Draft) -> None:
         plans = [
             p for name, p in draft.system.components.items() if fnmatch.fnmatchcase(name, component)
         ]
-        elsewhere = variable in (*PARTS, SOLVED) or variable.partition(".")[0] in _OF_PARTS
+        elsewhere = variable in (*CHOICES, SOLVED) or variable.partition(".")[0] in _OF_PARTS
         here = (v for p in plans for v in p.description.variables)
         if plans and not elsewhere and not any(fnmatch.fnmatchcase(v, variable) for v in here):
             text = f"{component} has no variable {variable!r}; `gfor fmu info` lists them"

@@ -14,7 +14,7 @@ from orchestrator.cases.flow.beside_file import BesideFile, FileVoltages, compar
 from orchestrator.cases.flow.power_flow import PowerFlow
 from orchestrator.cases.flow.solved_fault import SolvedFault
 from orchestrator.cases.form import component_forms
-from orchestrator.cases.form.build_choices import MODELS, STAND_IN, chosen_parts
+from orchestrator.cases.form.build_choices import MODELS, RECORDS, STAND_IN, chosen_parts
 from orchestrator.cases.form.definition import CaseDefinition
 from orchestrator.cases.form.names import close_names
 from orchestrator.cases.form.parameter_files import ParameterFile
@@ -63,6 +63,10 @@ from orchestrator.systems.coupling.schedule import (
 )
 from orchestrator.systems.coupling.step_awareness import STEP_PARAMETER, tell_step
 from orchestrator.systems.coupling.system import ComponentPlan, System
+
+_MADE_OF_PARTS = "'synchronous_generator' or 'synchronous_generator_phasor'"
+_MADE_OF_RECORDS = "'wecc_plant_phasor'"
+"""Models that let one choose what they are made of, in words."""
 
 
 @dataclass(frozen=True)
@@ -449,7 +453,7 @@ class Preparer:
             what = f"the model {table.model!r}" if table.model else "an FMU file"
             raise InputError(
                 f"{part} = {chosen[part]!r}: {what} has no such part to choose; remove the key, or take the model "
-                "'synchronous_generator' or 'synchronous_generator_phasor'"
+                f"{_MADE_OF_RECORDS if part == RECORDS else _MADE_OF_PARTS}"
             )
         return tuple(chosen.items())
 

@@ -106,6 +106,7 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
                 parts: dict[str, Any] = {**chosen_parts(table), **row.parts} if kind == "sg" else {}
                 if row.converter is not None or row.is_infinite:  # the row says all
                     values = {**row.parameters.get(kind, {}), **own}
+                    parts = dict(row.parts)
                 components[name] = ComponentTable(
                     model=_of_parts(model) if row.is_infinite else row.converter or model,
                     bus=row.bus,

@@ -10,7 +10,7 @@ from fmus.toolchain.catalogue import model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS
 from fmus.toolchain.model import FmiVersion
 from orchestrator.cases.case import load_case
-from orchestrator.cases.form.build_choices import PARTS, chosen_parts
+from orchestrator.cases.form.build_choices import PARTS, RECORDS, chosen_parts
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
 from orchestrator.devices.fmi.linear_model import linear_model_members
@@ -79,6 +79,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             metavar="PART",
             help=f"{part} of synchronous_generator, such as {_SUCH_AS[part]}",
         )
+    parser.add_argument(
+        f"--{RECORDS}",
+        metavar="NAMES",
+        help="PSS/E's records that wecc_plant_phasor is made of, such as 'REGCB1 REECC1 REPCA1'",
+    )
 
 
 def run(options: argparse.Namespace) -> int:

@@ -3,7 +3,7 @@
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.form.build_choices import PARTS, layer_of
+from orchestrator.cases.form.build_choices import CHOICES, PARTS, layer_of
 from orchestrator.core.errors import CaseError
 
 CASE = """
@@ -165,6 +165,7 @@ def test_a_part_is_a_choice_and_a_parameter_of_it_a_value():
     assert [(c.pattern, c.part, c.name) for c in layer.parts] == [("g1", "exciter", "sexs")]
     assert dict(layer.values) == {"g1.exciter.K": 90.0}
     assert set(PARTS) == {"machine", "exciter", "governor", "stabilizer"}
+    assert set(CHOICES) == {*PARTS, "records"}
 
 
 @pytest.mark.parametrize(("S_data", "asked"), [(0, True), (1000, False)])

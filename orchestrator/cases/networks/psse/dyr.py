@@ -4,7 +4,6 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from fmus.grid_following.dyr_fields import FIELDS, MODEL, PLANT
-from orchestrator.cases.networks.measured_point import MeasuredPoint
 from orchestrator.cases.networks.psse.dyr_mistakes import (
     LEAST_STRANGE,
     count_repeats,
@@ -17,12 +16,13 @@ from orchestrator.cases.networks.psse.dyr_mistakes import (
 from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
 from orchestrator.cases.networks.psse.following_converters import models_of_following
 from orchestrator.cases.networks.psse.machine_model import (
+    BY_SPEED,
     CLASSICAL,
     KNOWN_RECORDS,
-    MEASURING_ELSEWHERE,
-    WITH_COUPLING_IMPEDANCE,
+    SOURCE_IMPEDANCE,
     WITHOUT_INERTIA,
     MachineModel,
+    plant_of,
 )
 from orchestrator.cases.networks.psse.missing_models import (
     MissingModel,
@@ -60,6 +60,7 @@ def machine_models(
     parts: dict[tuple[int, str], dict[str, str]] = {key: {} for key in at}
     values: dict[tuple[int, str], dict[str, float]] = {key: {} for key in at}
     lines: dict[tuple[int, str], dict[str, int]] = {key: {} for key in at}
+    names: dict[tuple[int, str], dict[str, str]] = {key: {} for key in at}
     left = {name.upper() for name in leaving_out}
     _refuse_absent(leaving_out, records)
     labels = unit_labels(machines)
@@ -94,6 +95,7 @@ def machine_models(
             )
         else:
             parts[key][known.kind] = known.part
+            names[key][known.kind] = record.name
             try:
                 own = values_of_record(record, known)
                 values[key] |= own
@@ -133,7 +135,9 @@ def machine_models(
     open_ = {(record.bus, record.machine) for record in records if record.name in left}
     return following | {
         key: replace(
-            _model(at[key], parts[key], values[key], key in open_, measured.get(key)),
+            _converter(at[key], parts[key], names[key], values[key], key in measured)
+            if "converter" in parts[key]
+            else _machine(at[key], parts[key], values[key], key in open_),
             lines=lines[key],
             replaced=tuple(_left_out_of_plant(parts[key], of[key], left)),
             measured=measured.get(key),
@@ -187,19 +191,30 @@ def _left_out_of_plant(
             )
 
 
-def _model(
+def _converter(
     machine: Machine,
     parts: Mapping[str, str],
+    names: Mapping[str, str],
     values: Mapping[str, float],
-    partial: bool,
-    measured: MeasuredPoint | None,
+    elsewhere: bool,
 ) -> MachineModel:
-    if "converter" in parts:
-        own = dict(values)
-        if parts["converter"] in WITH_COUPLING_IMPEDANCE:
-            own = {"RL": machine.source.real, "XL": machine.source.imag, **values}
-        model = parts.get("plant", parts["converter"])
-        return MachineModel({}, own, MEASURING_ELSEWHERE if measured is not None else model)
+    """The model of a converter; ``names``: of its records by kind; ``elsewhere``: whether its plant measures there."""
+    own = dict(values)
+    if "shaft" not in parts:
+        own.pop(BY_SPEED, None)  # of a shaft that turns at rated speed
+    if "electrical" in parts:
+        model, made_of = plant_of(names, elsewhere=elsewhere)
+    else:
+        model, made_of = parts["converter"], {}
+    of_source = SOURCE_IMPEDANCE.get(names["converter"], SOURCE_IMPEDANCE.get(model, ()))
+    for name, value in zip(of_source, (machine.source.real, machine.source.imag), strict=False):
+        own.setdefault(name, value)
+    return MachineModel(made_of, own, model)
+
+
+def _machine(
+    machine: Machine, parts: Mapping[str, str], values: Mapping[str, float], partial: bool
+) -> MachineModel:
     source = {"machine.R_s": machine.source.real}
     if parts["machine"] == CLASSICAL:
         source["machine.X_d1"] = machine.source.imag

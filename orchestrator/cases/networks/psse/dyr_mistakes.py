@@ -3,11 +3,15 @@
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-from fmus.grid_following.dyr_fields import CONVERTER, FIELDS, MODEL, PLANT
+from fmus.grid_following.dyr_fields import FIELDS, MODEL, PLANT
 from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
 from orchestrator.cases.form.remedies import APPROXIMATING, replacement_of, without_models
 from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
-from orchestrator.cases.networks.psse.machine_model import KINDS_OF_CONVERTERS, KNOWN_RECORDS
+from orchestrator.cases.networks.psse.machine_model import (
+    KINDS_OF_CONVERTERS,
+    KNOWN_RECORDS,
+    ON_SHAFT,
+)
 from orchestrator.core.errors import few
 
 LEAST_STRANGE = (
@@ -45,15 +49,30 @@ def records_unfit(
 
 def _incomplete(machine: str, own: Mapping[str, str], unit: str) -> Iterator[str]:
     """Yield what the records of one of WECC's plants lack; ``unit``: the label of its unit."""
-    needs = own.get("converter") == PLANT_RECORDS[CONVERTER].part
-    if needs == ("electrical" in own) and (needs or "plant" not in own):
+    needs = own.get("converter") in _converters_of_plants()
+    beside = {*KINDS_OF_CONVERTERS} - {"converter", "electrical"}
+    lonely = [kind for kind in ON_SHAFT if kind in own and "shaft" not in own]
+    if lonely:
+        named = [name for name, record in PLANT_RECORDS.items() if record.kind in lonely]
+        yield (
+            f"{machine} has records of a wind turbine's {few(lonely, _NAMED)} and no WTDTA1, its shaft; add it, or "
+            f"write {without_models(named)}, and the shaft turns at rated speed"
+        )
+    if needs == ("electrical" in own) and (needs or not beside & {*own}):
         return
     there = " and ".join(kind for kind in KINDS_OF_CONVERTERS if kind in own)
-    missing = "REECA1 or REECB1" if needs else CONVERTER
+    wanted = "electrical" if needs else "converter"
+    *first, last = (name for name, record in PLANT_RECORDS.items() if record.kind == wanted)
+    missing = f"{', '.join(first)} or {last}"
     yield (
         f"{machine} has records of its {there} and no {missing}: together they are a plant of WECC's generic models; "
         f"add it, or write {replacement_of(unit)}, and a converter of ours stands there"
     )
+
+
+def _converters_of_plants() -> set[str]:
+    """Parts of the records of converters that need a control."""
+    return {record.part for record in PLANT_RECORDS.values() if record.kind == "converter"}
 
 
 def without_machine(

@@ -225,6 +225,7 @@ def with_records(
                 replace(
                     row,
                     parameters=own,
+                    parts=model.parts,
                     converter=model.converter,
                     replaced=model.replaced,
                     measured=model.measured,

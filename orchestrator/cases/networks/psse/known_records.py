@@ -74,6 +74,10 @@ _KINDS = {
     "converter": "converter",
     "electrical": "converter control",
     "plant": "plant control",
+    "shaft": "plant shaft",
+    "aerodynamics": "plant aerodynamics",
+    "pitch": "plant pitch control",
+    "torque": "plant torque control",
 }
 """Words for the kinds of a plant's records."""
 

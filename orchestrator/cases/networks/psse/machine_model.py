@@ -7,19 +7,33 @@ from dataclasses import dataclass
 from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
 from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
-from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
+from fmus.wecc_renewable.dyr_fields import ELSEWHERE, PLANT_MODEL, PLANT_RECORDS
 from orchestrator.cases.networks.measured_point import MeasuredPoint
 from orchestrator.cases.networks.unit_row import DoubtOfRecord
 
 KNOWN_RECORDS = DYR_RECORDS | REGFM_A1_RECORDS | STATIC_VAR_RECORDS | PLANT_RECORDS
-WITH_COUPLING_IMPEDANCE = {record.part for record in REGFM_A1_RECORDS.values()}
-"""Models whose coupling impedance is ZSORCE of the network data."""
+ON_SHAFT = ("aerodynamics", "pitch", "torque")
+"""Kinds of records of a wind turbine that act on its shaft."""
 
-KINDS_OF_CONVERTERS = ("converter", "electrical", "plant")
+KINDS_OF_CONVERTERS = ("converter", "electrical", "plant", "shaft", *ON_SHAFT)
 """Kinds of records that a converter is made of."""
 
-MEASURING_ELSEWHERE = "regca1_repca1_remote_phasor"
-"""The model of a plant whose controller measures at another point of the network."""
+SOURCE_IMPEDANCE = {
+    "regfm_a1_phasor": ("RL", "XL"),
+    "REGCB1": ("Re", "Xe"),
+    "REGCC1": ("Re", "Xe"),
+}
+"""Parameters that ZSORCE of the network data gives, by the converter's model or record."""
+
+BY_SPEED = "electrical.PFLAG"
+"""Parameter of a control that only a plant with a shaft has."""
+
+PLANT_MODELS = {
+    (): "regca1_phasor",
+    ("plant",): "regca1_repca1_phasor",
+    ("plant", ELSEWHERE): "regca1_repca1_remote_phasor",
+}
+"""Models of REGCA1 with REECA1 or REECB1, by what they have besides."""
 
 MANUAL = "manual"
 """The exciter without a regulator, on which neither a stabiliser nor a compensator acts."""
@@ -48,3 +62,20 @@ class MachineModel:
     partial: bool = False
     lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
     measured: MeasuredPoint | None = None
+
+
+def plant_of(names: Mapping[str, str], *, elsewhere: bool) -> tuple[str, dict[str, str]]:
+    """The model of a plant of WECC's generic models, and the parts that it is made of.
+
+    ``names``: of its records by their kind; ``elsewhere``: whether its controller measures at another point."""
+    word = (ELSEWHERE,) if elsewhere else ()
+    besides = tuple(kind for kind in names if kind not in ("converter", "electrical")) + word
+    first = (names["converter"], names["electrical"])
+    if first in _FIRST and besides in PLANT_MODELS:
+        return PLANT_MODELS[besides], {}
+    order = [names[kind] for kind in KINDS_OF_CONVERTERS if kind in names]
+    return PLANT_MODEL, {"records": " ".join([*order, *word])}
+
+
+_FIRST = {("REGCA1", "REECA1"), ("REGCA1", "REECB1")}
+"""Converters and controls that have models of their own."""

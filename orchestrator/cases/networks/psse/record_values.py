@@ -22,9 +22,10 @@ def _refuse_choice(record: DynamicRecord, field: DyrField, value: float) -> None
     if field.name == _BUS:
         if value == record.bus:
             return
+        coarser = f", or {APPROXIMATING} for {MODEL}" if record.name in FIELDS else ""
         raise InputError(
             f"{record.place}: {record.name} has {_BUS} = {value:g}: its control measures at another bus than its "
-            f"terminal, which no part of ours does; write {_BUS} = 0 for the terminal, or {APPROXIMATING} for {MODEL}"
+            f"terminal, which no part of ours does; write {_BUS} = 0 for the terminal{coarser}"
         )
     allowed = " or ".join(f"{x:g}" for x in field.only)
     raise InputError(

@@ -94,11 +94,6 @@ def test_every_field_sets_a_parameter_of_the_model():
             "'WT4G1'",
             r"stands for WT4G1, a grid-following converter; write replace = ",
         ),
-        (
-            "'REGFMA1'",
-            "'REGCB1'",
-            r"stands for REGCB1, a grid-following converter; write replace = ",
-        ),
     ],
 )
 def test_what_cannot_be_taken_over(old, new, words, tables):

@@ -5,6 +5,7 @@ import json
 import pytest
 import xarray as xr
 
+from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
 from orchestrator.core.errors import CaseError
 from tests.cases.networks.psse.test_dyr_following import REGCA1, dyr, prepared, record
 
@@ -129,11 +130,11 @@ def test_a_plant_controller_that_is_left_out_is_said(prepared):
     [
         (
             dyr().replace("3 'REECB1'", "1 'REECB1'"),
-            r"machine '1' at bus 3 has records of its converter and no REECA1 or REECB1.*replace =",
+            r"machine '1' at bus 3 has records of its converter and no REECA1, REECB1, REECC1 or REECD1.*replace =",
         ),
         (
             dyr().replace("3 'REGCA1'", "1 'REGCA1'"),
-            r"machine '1' at bus 3 has records of its electrical and no REGCA1",
+            r"machine '1' at bus 3 has records of its electrical and no REGCA1, REGCB1 or REGCC1",
         ),
         (
             dyr(plant=record("REGCA1", REGCA1)),
@@ -170,3 +171,101 @@ def test_the_system_with_a_plant_has_a_steady_state_and_modes(prepared, tmp_path
     scenario = json.loads(out)["scenarios"][0]
     assert scenario["stable"]
     assert any("gfor3.plant" in str(mode) for mode in scenario["modes"])
+
+
+# -- the other records ------------------------------------------------------------------------------
+
+BATTERY = {"PFFLAG": 0, "VFLAG": 0, "QFLAG": 1, "PQFLAG": 0, "Vdip": 0.8, "Vup": 1.2, "Trv": 0.02}
+BATTERY |= {"Iqh1": 1.1, "Iql1": -1.1, "Tp": 0.05, "QMax": 0.6, "QMin": -0.6, "VMAX": 1.1}
+BATTERY |= {"VMIN": 0.9, "Kvp": 1.0, "Kvi": 40.0, "Tiq": 0.02, "dPmax": 99.0, "dPmin": -99.0}
+BATTERY |= {"PMAX": 1.0, "PMIN": -1.0, "Imax": 1.3, "Tpord": 0.02, "T": 3600.0, "SOCini": 0.4}
+BATTERY |= {"SOCmax": 0.9, "SOCmin": 0.1}
+TYPE_D = {name: value for name, value in BATTERY.items() if not name.startswith(("T", "SOC"))}
+TYPE_D |= {"Trv": 0.02, "Tp": 0.05, "Tiq": 0.02, "Tpord": 0.02, "QVmax": 0.6, "QVmin": -0.6}
+TYPE_D |= {"VFLAG": 1, "VCMPFLAG": 1, "Xc": 0.05, "Ke": 1.0, "Vblkh": 1.4, "Vblkl": 0.1}
+EMF = {"PQFLAG": 1, "Tg": 0.02, "Tfltr": 0.02, "Iqrmax": 99.0, "Iqrmin": -99.0, "rrpwr": 10.0}
+EMF |= {"Te": 0.01, "Imax": 1.3}
+LOOP = EMF | {"Kip": 0.5, "Kii": 20.0, "Kppll": 20.0, "Kipll": 200.0, "wmax": 12.0, "wmin": -12.0}
+
+
+def line(name, values):
+    """A record of the unit at bus 3; fields that are not given are 0."""
+    fields = [field.name for field in PLANT_RECORDS[name].fields]
+    return f"3 '{name}' 1 {' '.join(str(values.get(field, 0)) for field in fields)} /\n"
+
+
+def with_records(*lines):
+    """The file with these records in place of the unit's own."""
+    others = [one for one in dyr().splitlines(keepends=True) if not one.startswith("3 ")]
+    return "".join([*others, *lines])
+
+
+OF_REGCA1 = record("REGCA1", REGCA1, **VOLTAGES)
+WIND = (
+    "3 'WTDTA1' 1 4.5 0.0 0.85 1.6 1.4 /\n",
+    "3 'WTARA1' 1 0.007 0.0 /\n",
+    "3 'WTPTA1' 1 25 150 30 3 0 0.3 27 0 10 -10 /\n",
+    "3 'WTTQA1' 1 0 3 0.6 0.05 60 1.2 0 0.2 0.58 0.4 0.72 0.6 0.86 0.8 1 0 /\n",
+)
+MADE = {
+    "REGCB1 REECC1": (line("REGCB1", EMF), line("REECC1", BATTERY)),
+    "REGCC1 REECD1 REPCA1": (line("REGCC1", LOOP), line("REECD1", TYPE_D), PLANT.format("1")),
+    "REGCA1 REECC1 REPCA1 elsewhere": (
+        OF_REGCA1,
+        line("REECC1", BATTERY),
+        elsewhere("9 9 8"),
+    ),
+    "REGCA1 REECA1 WTDTA1 WTARA1 WTPTA1 WTTQA1": (
+        OF_REGCA1,
+        line("REECA1", BATTERY),
+        *WIND,
+    ),
+}
+
+
+@pytest.mark.parametrize("records", MADE)
+def test_other_records_are_one_plant(records, prepared):
+    plan = unit(prepared(with_records(*MADE[records]), ""))
+    made = "_".join(records.lower().split())
+    assert plan.description.model_name == f"wecc_plant_{made}_phasor"
+    given = plan.parameters
+    if "REGCA1" not in records:  # ZSORCE of the network data
+        assert (given["Re"], given["Xe"]) == (0.0, 0.2)
+    if "REECC1" in records:
+        assert (given["electrical.SOCini"], given["electrical.T"]) == (0.4, 3600.0)
+    if "WTTQA1" in records:
+        assert (given["torque.P3"], given["shaft.Freq1"]) == (0.6, 1.6)
+
+
+@pytest.mark.parametrize("records", [name for name in MADE if "elsewhere" not in name])
+@pytest.mark.slow
+def test_the_system_with_such_a_plant_has_modes_and_a_run(records, prepared, tmp_path, gfor):
+    prepared(with_records(*MADE[records]), "")
+    code, out, error = gfor("modes", tmp_path / "case.toml", "--json")
+    assert code == 0, error
+    scenario = json.loads(out)["scenarios"][0]
+    assert scenario["stable"]
+    event = '{ type = "load_change", time = "0.1 s", load = "load_8", scale = 1.05 }'
+    case = (tmp_path / "case.toml").read_text() + f"events = [{event}]\n"
+    (tmp_path / "case.toml").write_text(case)
+    code, _, error = gfor("run", tmp_path / "case.toml", "--stop", "1", "--out", tmp_path / "out")
+    assert code == 0, error
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        (
+            (line("REGCB1", EMF), line("REECC1", BATTERY | {"BUSR": 8})),
+            r"REECC1 has BUSR = 8: its control measures at another bus .*write BUSR = 0 for the terminal$",
+        ),
+        (
+            (OF_REGCA1, line("REECC1", BATTERY), WIND[3]),
+            r"has records of a wind turbine's torque and no WTDTA1, its shaft.*leave_out = \['WTTQA1'\]|WTTQA1",
+        ),
+        ((line("REGCC1", LOOP),), r"records of its converter and no REECA1, REECB1, REECC1 or"),
+    ],
+)
+def test_records_that_lack_something_are_named(lines, words, prepared):
+    with pytest.raises(CaseError, match=f"(?ms){words}"):
+        prepared(with_records(*lines), "")

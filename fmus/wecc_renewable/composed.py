@@ -1,0 +1,75 @@
+"""The plant whose records are chosen by name: `wecc_plant_phasor`."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from fmus.toolchain.model import Model
+from fmus.wecc_renewable.behind_impedance import REGCB1, REGCC1
+from fmus.wecc_renewable.converters import REGCA1, Kind
+from fmus.wecc_renewable.dyr_fields import ELSEWHERE
+from fmus.wecc_renewable.electrical import Reeca1
+from fmus.wecc_renewable.electrical_blocking import Reecd1
+from fmus.wecc_renewable.electrical_storage import Reecc1
+from fmus.wecc_renewable.model import Makeup, composed
+from fmus.wecc_renewable.turbine import TurbineParts
+
+CONVERTERS: dict[str, Kind] = {"REGCA1": REGCA1, "REGCB1": REGCB1, "REGCC1": REGCC1}
+CONTROLS: dict[str, type[Reeca1]] = {
+    "REECA1": Reeca1,
+    "REECB1": Reeca1,
+    "REECC1": Reecc1,
+    "REECD1": Reecd1,
+}
+PLANT = "REPCA1"
+SHAFT = "WTDTA1"
+ON_SHAFT = ("WTARA1", "WTPTA1", "WTTQA1")
+
+
+def wecc_plant_phasor(records: str = "REGCC1 REECD1") -> Model:
+    """Plant of WECC's generic models, phasor type.
+
+    Parameters
+    ----------
+    records
+        PSS/E's names of its records, in any order: one of `CONVERTERS` and one of `CONTROLS`; REPCA1, with the word
+        ``elsewhere`` if it measures at another point of the network; WTDTA1, and with it some of `ON_SHAFT`.
+
+    Raises
+    ------
+    ValueError
+        If a name is none of these, a kind lacks, or there are two of one kind.
+    """
+    given = records.split()
+    converter = _one_of("converter", CONVERTERS, given)
+    control = _one_of("control", CONTROLS, given)
+    known = {*CONVERTERS, *CONTROLS, PLANT, ELSEWHERE, SHAFT, *ON_SHAFT}
+    for name in given:
+        if name not in known or given.count(name) > 1:
+            what = "stands twice" if name in known else f"is none of {', '.join(sorted(known))}"
+            raise ValueError(f"records = {records!r}: {name!r} {what}")
+    needed = {ELSEWHERE: PLANT, **dict.fromkeys(ON_SHAFT, SHAFT)}
+    for name, other in needed.items():
+        if name in given and other not in given:
+            raise ValueError(f"records = {records!r}: {name!r} needs {other!r} beside it")
+    turbine = TurbineParts(*(name in given for name in ON_SHAFT)) if SHAFT in given else None
+    makeup = Makeup(
+        CONVERTERS[converter],
+        CONTROLS[control],
+        has_plant=PLANT in given,
+        measures_elsewhere=ELSEWHERE in given,
+        turbine=turbine,
+    )
+    rest = [name for name in (PLANT, ELSEWHERE, SHAFT, *ON_SHAFT) if name in given]
+    name = "_".join(["wecc_plant", *(n.lower() for n in (converter, control, *rest)), "phasor"])
+    title = f"Plant of {', '.join(n for n in (converter, control, *rest) if n != ELSEWHERE)}"
+    return replace(composed(name, f"{title} (phasor type)", makeup), of_parts=True)
+
+
+def _one_of(kind: str, choices: Mapping[str, object], given: list[str]) -> str:
+    found = [name for name in given if name in choices]
+    if len(found) != 1:
+        many = "more than one" if found else "no"
+        raise ValueError(
+            f"records = {' '.join(given)!r}: {many} {kind}; name one of {', '.join(choices)}"
+        )
+    return found[0]
