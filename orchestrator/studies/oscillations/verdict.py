@@ -90,7 +90,10 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
             skirt=0.0,
             periods=periods,
             disturbed=False,
-            reasons=(f"only {periods:.1f} periods are seen",),
+            reasons=(
+                f"the record shows it for {periods:.1f} periods, and {_FEWEST_PERIODS} are needed "
+                "to tell a driven oscillation from one that decays",
+            ),
         )
     seen, envelopes = [], []
     for k in columns:

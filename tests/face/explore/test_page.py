@@ -1,6 +1,7 @@
 """The page of `gfor explore` in a real browser."""
 
 import json
+import math
 import os
 import re
 import shutil
@@ -55,7 +56,8 @@ def browser():
 @contextmanager
 def served(case, scenario, values=None):
     beginning = {"case": case, "scenario": scenario, "values": values or {}, "range": [0.1, 2.0]}
-    explorer = Explorer(case, beginning)
+    # it is there for the whole module, however long the tests of saved pages take in between
+    explorer = Explorer(case, beginning, linger=math.inf)
     threading.Thread(target=explorer.serve, daemon=True).start()
     yield explorer
     explorer.close()
@@ -130,7 +132,9 @@ def test_map_table_and_verdict_are_those_of_the_command(view, capsys):
     least = min(content["modes"], key=lambda m: m["damping_percent"])
     said = f"{least['frequency_hz']:.3f} Hz, {least['damping_percent']:.2f} %"
     headline = "SG + GFOR POD-P: stable (small-signal); least damped from 0.1 to 2 Hz: "
-    assert view.locator("#verdict").inner_text().startswith(headline)
+    verdict = view.locator("#verdict").inner_text()
+    assert verdict.startswith(headline)
+    assert verdict.endswith("(sg1; sg2 at +127°)")  # as `gfor modes` says it
     assert said in view.locator("#verdict").inner_text()
     assert content["stability"]["sentence"] in view.locator("#outside span").inner_text()
     assert [row[:2] for row in rows(view)] == shown(content["modes"])

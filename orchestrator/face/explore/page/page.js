@@ -48,7 +48,7 @@ function paintVerdict() {
   const one = seen.answer.modes.scenarios[0];
   $("verdict").className = one.stable === true ? "good" : one.stable === false ? "bad" : "";
   const least = leastOf(seen.modes), [low, high] = state.range;
-  const swing = least ? `least damped from ${number(low)} to ${number(high)} Hz: ${fixed(least.frequency_hz, 3)} Hz, ${fixed(least.damping_percent, 2)} % (${Object.keys(least.components).slice(0, 2).join(", ")})` : `no oscillation from ${number(low)} to ${number(high)} Hz`;
+  const swing = least ? `least damped from ${number(low)} to ${number(high)} Hz: ${fixed(least.frequency_hz, 3)} Hz, ${fixed(least.damping_percent, 2)} % (${swingers(seen.modes.indexOf(least), 3) || Object.keys(least.components).slice(0, 2).join(", ")})` : `no oscillation from ${number(low)} to ${number(high)} Hz`;
   $("verdict").textContent = `${titleNow()}: ${one.stable === true ? "stable" : one.stable === false ? "UNSTABLE" : "not known"} (small-signal); ${swing}`;
   $("outside").querySelector("span").textContent = [`${seen.answer.verdict}.`, seen.answer.outside && `${seen.answer.outside}.`, ...(seen.answer.warnings ?? one.warnings).map(text => `Warning: ${text}`)].filter(Boolean).join(" ");
   $("wider").hidden = Boolean(SAVED) || !seen.answer.outside || state.range[1] >= 1000;

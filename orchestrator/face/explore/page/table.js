@@ -62,15 +62,19 @@ function paintTable() {
 function bars(title, entries) {
   return [make("h3", {}, title), ...entries.map(([name, share]) => make("div", { class: "bar" }, make("span", {}, name), make("meter", { min: 0, max: 1, value: share, "aria-label": `${name} ${fixed(100 * share, 1)} %` }), make("span", {}, fixed(share, 2))))];
 }
+// Who swings against whom in the mode at a place, in the words of `gfor modes`.
+function swingers(place, most = 6) {
+  const [together, against, between = {}] = seen.answer.swings?.[place] ?? [[], []];
+  const few = units => `${units.slice(0, most).join(", ")}${units.length > most ? ` and ${units.length - most} more` : ""}`;
+  const others = few(Object.entries(between).map(([name, angle]) => `${name} at ${angle > 0 ? "+" : ""}${fixed(angle, 0)}°`));
+  return [[together, against].filter(side => side.length).map(few).join(" against "), others].filter(Boolean).join("; ");
+}
 let turning = null;
 function paintChosen() {
   cancelAnimationFrame(turning);
   const m = seen.modes[chosenIndex()], place = $("chosen");
   if (!m) { place.replaceChildren(make("p", { class: "soft" }, "Choose a mode in the map or the table: participation and shape.")); return; }
-  const swing = seen.answer.swings?.[chosenIndex()] ?? [[], []];
-  const some = units => `${units.slice(0, 6).join(", ")}${units.length > 6 ? ` and ${units.length - 6} more` : ""}`;
-  const between = some(Object.entries(swing[2] ?? {}).map(([name, angle]) => `${name} at ${angle > 0 ? "+" : ""}${fixed(angle, 0)}°`));
-  const who = [swing[0], swing[1]].filter(side => side.length).map(some).join(" against ") + (between ? `; ${between}, neither with nor against` : "");
+  const who = swingers(chosenIndex());
   const moving = make("input", { type: "checkbox", id: "moving" });
   const shape = draw("svg", { class: "shape", viewBox: "-150 -105 300 210", role: "img", "aria-label": `Mode shape: ${m.shape.map(s => `${s.state} ${number(s.magnitude, 2)} at ${fixed(s.angle_deg, 0)}°`).join("; ")}` });
   const largest = Math.max(...m.shape.map(s => s.magnitude), 1e-12);

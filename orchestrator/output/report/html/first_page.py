@@ -10,7 +10,7 @@ from orchestrator.output.report.html.origins import given_in
 from orchestrator.output.report.html.verdict_lines import verdicts
 from orchestrator.output.report.tables import short
 
-_NOTHING = "nothing that is known of"
+_NOTHING = "nothing was left out"
 
 _OPEN = 4
 """So many sentences about what a study did not judge stand on the first page; the others are counted."""
