@@ -5,6 +5,7 @@ An instance is loaded into this process (`loaded`), runs in one of its own (`iso
 
 import ctypes
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from types import TracebackType
 from typing import Any, Protocol, Self
 
@@ -24,6 +25,10 @@ class Component(Protocol):
     set_real: Any
     get_real: Any
     do_step: Any
+
+    @property
+    def held_states(self) -> tuple[str, ...]:
+        """States that `hold` leaves out."""
 
     @property
     def description(self) -> FmuDescription:
@@ -47,6 +52,9 @@ class Component(Protocol):
 
     def exit_initialization_mode(self) -> None:
         """Compute the initial values; from here on it can step."""
+
+    def hold(self, states: Sequence[str]) -> None:
+        """Leave states out of the description of this instance, so that linear models have all but these."""
 
     def step(self, time: float, step_size: float) -> None:
         """One communication step [s]."""
@@ -100,11 +108,23 @@ class Component(Protocol):
 
 
 class Derived(Closing):
-    """Methods of a component that use its other methods alone; it holds no data."""
+    """Methods of a component that use its other methods alone."""
+
+    held_states: tuple[str, ...] = ()
 
     @property
     def one_thread(self) -> str | None:
         return "in a process of its own"
+
+    def hold(self: Component, states: Sequence[str]) -> None:
+        whole: FmuDescription = vars(self).setdefault("_with_all_states", self.description)
+        names, rates = whole.states, whole.rates
+        kept = [k for k, name in enumerate(names) if name not in states]
+        vars(self)["held_states"] = tuple(states)
+        if len(rates) == len(names):
+            rates = tuple(rates[k] for k in kept)
+        states = tuple(names[k] for k in kept)
+        vars(self)["description"] = replace(whole, states=states, rates=rates)
 
     def step(self: Component, time: float, step_size: float) -> None:
         with calls:

@@ -32,7 +32,8 @@ def remembered(
     if not keep_by_system(master, "ours", (component,), lambda: is_ours(description.path)):
         return linearized()
     names = (exchange.inputs.names, exchange.outputs.names)
-    key = (name, description.path, description.guid, names, asked, master.time, _state(component))
+    of = (description.path, description.guid, description.states)
+    key = (name, *of, names, asked, master.time, _state(component))
     if key not in store:
         store[key] = linearized()
     found: ComponentLinearization = store[key]

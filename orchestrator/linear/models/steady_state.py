@@ -11,6 +11,13 @@ from orchestrator.core.arrays import Matrix
 from orchestrator.core.errors import AnalysisError, ErrorKind
 from orchestrator.linear.models.coupled_state import CoupledState
 from orchestrator.linear.models.device_start import misfits_of, sentences
+from orchestrator.linear.models.held_states import (
+    HeldState,
+    examine_held,
+    held_names,
+    hold,
+    release,
+)
 from orchestrator.linear.models.linear_model import HELD
 from orchestrator.linear.models.linearization import Blocks, compose
 from orchestrator.linear.models.periodic import find_periodic_point
@@ -21,6 +28,7 @@ from orchestrator.systems.coupling.schedule import gauss_seidel
 
 # far above the rounding in a computed eigenvalue 1, and far below 1 − |μ| of the slowest mode
 _SHIFT = 1e-7
+_STORES = 20  # states that go on at rest, above which they are not taken for stores
 _SHORT = 1e-4  # for steps shorter than this [s], the accepted change is a rate per second
 
 
@@ -33,6 +41,8 @@ class OperatingPoint:
     # number of Newton iterations; 0 if the power flow's point is a steady state already
     iterations: int
     states: dict[str, float]  # values of the states by ``component.state``
+    # those that go on at rest and move no port: they are held, and no part of the linear model
+    held: tuple[HeldState, ...] = ()
 
 
 def find_operating_point(
@@ -47,6 +57,34 @@ def find_operating_point(
     steps = steps_of_period(master, master.clock.step_size)
     if steps > 1:
         return _periodic_point(master, steps, tolerance, accept, max_iterations)
+    # the same drift is accepted however short the step is
+    tolerance *= min(1.0, master.clock.step_size / _SHORT)
+    start = CoupledState(master).read()
+    found = _search(master, accept, max_iterations)
+    held = examine_held(master, held_names(master))
+    if not found.residual <= tolerance:
+        found, held = _beside_stores(master, start, found, tolerance, accept, max_iterations)
+    values = dict(zip(found.names, found.x.tolist(), strict=True))
+    drift = found.residual / master.clock.step_size
+    return OperatingPoint(found.residual, drift, found.first, found.iterations, values, held)
+
+
+@dataclass(frozen=True)
+class _Search:
+    """Where Newton's method came: the states and their change over a communication step."""
+
+    names: tuple[str, ...]
+    x: Matrix
+    change: Matrix
+    first: float  # largest change at the start
+    iterations: int
+
+    @property
+    def residual(self) -> float:
+        return _largest(self.change)
+
+
+def _search(master: Master, accept: float, max_iterations: int) -> _Search:
     state = CoupledState(master)
     x = state.read()
     change = state.step_from(x) - x
@@ -68,24 +106,62 @@ def find_operating_point(
         x, change, residual = candidate, new_change, _largest(new_change)
         iterations += 1
     names = [f"{name}.{s}" for name, c in master.components.items() for s in c.description.states]
-    # the same drift is accepted however short the step is
-    tolerance *= min(1.0, master.clock.step_size / _SHORT)
-    if not residual <= tolerance:
-        worst = ", ".join(f"{names[i]} ({change[i]:+.3g})" for i in np.argsort(-np.abs(change))[:3])
-        changes = f"{_newton_in_words(iterations)} a communication step changes {worst}, more than {tolerance:g}"
-        present = described(master.system.wires)
-        if present:
-            raise AnalysisError(
-                f"no steady state found with {'; '.join(present)}: leave it out, or let it begin later, as an event "
-                f"([[events]] with a time); {changes}",
-                kind=ErrorKind.STEADY_STATE,
-            )
+    return _Search(tuple(names), x, change, first, iterations)
+
+
+def _beside_stores(
+    master: Master,
+    start: Matrix,
+    found: _Search,
+    tolerance: float,
+    accept: float,
+    max_iterations: int,
+) -> tuple[_Search, tuple[HeldState, ...]]:
+    """Search again with the states held that go on; raise if they are no stores, or the others do not rest either."""
+    going = [
+        name
+        for name, change in zip(found.names, found.change.tolist(), strict=True)
+        if abs(change) > tolerance and _is_settable(master, name)
+    ]
+    reason = ""
+    if going and len(going) <= _STORES:
+        state = CoupledState(master)
+        state.write(start)
+        hold(master, going)
+        again = _search(master, accept, max_iterations)
+        if again.residual <= tolerance:
+            held = examine_held(master, going)
+            reasons = [one.reason for one in held if one.reason]
+            if not reasons:
+                return again, held
+            reason = reasons[0] if all(one.looks_silent for one in held) else ""
+        release(master, going)
+        state.write(found.x)
+    worst = ", ".join(
+        f"{found.names[i]} ({found.change[i]:+.3g})" for i in np.argsort(-np.abs(found.change))[:3]
+    )
+    changes = f"{_newton_in_words(found.iterations)} a communication step changes {worst}, more than {tolerance:g}"
+    if reason:
         raise AnalysisError(
-            f"no steady state found: {changes}; {what_to_check(master)}",
+            f"no steady state found: {reason}, so that it is no store which could be held; `gfor run` simulates it, "
+            "and `gfor modes CASE --black-box` measures its component as it is",
             kind=ErrorKind.STEADY_STATE,
         )
-    values = dict(zip(names, x.tolist(), strict=True))
-    return OperatingPoint(residual, residual / master.clock.step_size, first, iterations, values)
+    present = described(master.system.wires)
+    if present:
+        raise AnalysisError(
+            f"no steady state found with {'; '.join(present)}: leave it out, or let it begin later, as an event "
+            f"([[events]] with a time); {changes}",
+            kind=ErrorKind.STEADY_STATE,
+        )
+    raise AnalysisError(
+        f"no steady state found: {changes}; {what_to_check(master)}",
+        kind=ErrorKind.STEADY_STATE,
+    )
+
+
+def _is_settable(master: Master, state: str) -> bool:
+    return master.components[state.partition(".")[0]].description.states_are_settable
 
 
 def _periodic_point(

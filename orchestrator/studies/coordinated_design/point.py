@@ -189,7 +189,7 @@ def _at(
     places: Sequence[PodPlace],
     warnings: tuple[str, ...],
 ) -> PointModes:
-    find_operating_point(master, accept=ACCEPT)
+    point = find_operating_point(master, accept=ACCEPT)
     silent = [name for name, exchange in master.exchanges.items() if not gives_slopes(exchange)]
     if silent:
         raise AnalysisError(
@@ -197,7 +197,8 @@ def _at(
             "them of all FMUs"
         )
     linear = bench.linear_model()
-    model, blocks, warnings = linear.model, linear.blocks, (*warnings, *linear.doubts)
+    model, blocks = linear.model, linear.blocks
+    warnings = (*warnings, *(one.sentence for one in point.held), *linear.doubts)
     if len(model.names) > _MOST_STATES:
         raise AnalysisError(
             f"the system has {len(model.names)} states; a design needs all eigenvalues, of at most "

@@ -261,7 +261,7 @@ class Linearised:
         self._range, self._critical, self._said = (
             frequency_range,
             critical,
-            (*sentences(misfits), *said),
+            (*sentences(misfits), *said, *(one.sentence for one in point.held)),
         )
         self._black_boxes = black_boxes
         self._model, self._system = model_of(master, blocks), continuous_model(master, blocks)

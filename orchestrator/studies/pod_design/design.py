@@ -306,6 +306,8 @@ def design_pod(
         )
         report("modes without the controller")
         examined = loop.examine(_OFF)
+        said = (one.sentence for one in point.held)
+        examined = replace(examined, warnings=(*said, *examined.warnings))
         with _with_stability(examined.stability):
             model = loop.model(_OFF)
             before = surroundings(model, None, naming)
