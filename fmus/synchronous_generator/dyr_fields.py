@@ -51,11 +51,12 @@ class DyrRecord:
     ``kind``: key of the component's table: ``machine``, ``exciter``, ``governor`` or ``stabilizer``; ``compensator``
     for what an exciter measures, which is no part of its own; ``converter`` for a record that is a whole component, to
     which ``electrical`` and ``plant`` may belong as its control and its plant's, ``shaft``, ``aerodynamics``, ``pitch``
-    and ``torque`` as its wind turbine's;
+    and ``torque`` as its wind turbine's; ``load`` for one that is a load's;
     ``part``: its value, the name of our part; for a whole component, its model;
     ``fields``: in the file's order; ``lacks``: parameters of our part that 0 leaves out, as the record has none;
     ``omissions``: what our part leaves out where a field, by its name, is not 0;
-    ``without``: switches of our part that are off, as the record does not have what they switch."""
+    ``without``: switches of our part that are off, as the record does not have what they switch; ``switched_on``:
+    those that are on, as the record always has it."""
 
     kind: str
     part: str
@@ -63,6 +64,7 @@ class DyrRecord:
     lacks: tuple[str, ...] = ()
     omissions: Mapping[str, str] = field(default_factory=dict)
     without: tuple[str, ...] = ()
+    switched_on: tuple[str, ...] = ()
 
 
 SIGNALS_OF_BUSES = (2, 5, 6)
@@ -81,6 +83,7 @@ _SCOPES = {
     "stabilizer": "pss.",
     "compensator": "exciter.",
     "converter": "",
+    "load": "",
     "electrical": "electrical.",
     "plant": "plant.",
     "shaft": "shaft.",
@@ -126,13 +129,18 @@ def _record(table: Mapping[str, Any]) -> DyrRecord:
             is_text=found["text"] != "",
         )
         fields.append(one)
+
+    def names_of(key: str) -> tuple[str, ...]:
+        return tuple(f"{scope}{name}" for name in table.get(key, ()))
+
     return DyrRecord(
         table["kind"],
         table["part"],
         tuple(fields),
-        tuple(f"{scope}{p}" for p in table.get("lacks", ())),
+        names_of("lacks"),
         table.get("omissions", {}),
-        without=tuple(f"{scope}{p}" for p in table.get("without", ())),
+        without=names_of("without"),
+        switched_on=names_of("switched_on"),
     )
 
 

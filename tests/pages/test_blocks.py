@@ -44,6 +44,7 @@ FMUS = (
     "external_grid",
     "static_generation",
     "csvgn1_phasor",
+    "induction_motor_phasor",
     "regca1_phasor",
 )
 """FMUs that the Python blocks of the leaflets open."""

@@ -121,6 +121,13 @@ REFERENCES = (
         ("i_re", "i_im", "e_re", "e_im", "B"),
     ),
     Reference(
+        "induction_motor_phasor",
+        "fmus/induction_machine/reference.csv",
+        {"P_0": -0.8, "Q_0": -0.35, "R2": 0.05, "X2": 0.1, "E": 2.0},
+        *_BUS,
+        ("i_re", "i_im", "e_re", "e_im", "speed", "T_e", "T_L"),
+    ),
+    Reference(
         "synchronous_generator_ac4a",
         f"{_FOLDER}/reference_ac4a.csv",
         {"P_0": 0.8, **_EXACT},

@@ -66,6 +66,7 @@ ALL_PATHS_OPEN = {
     "gfl_l2ep_phasor": _L2EP_OPEN | {"communication_step": 5e-3},
     "static_generation_phasor": {"communication_step": 5e-3, "R": 0.01},
     "csvgn1_phasor": {"communication_step": 5e-3, "R": 0.01},
+    "induction_motor_phasor": {"communication_step": 5e-3, "R2": 0.05, "X2": 0.1, "A": 0.5},
     "regca1_phasor": _PLANT_OPEN,
     "wecc_plant_phasor": {"communication_step": 5e-3, "Re": 0.01},
     "regca1_repca1_phasor": _PLANT_OPEN,
@@ -91,7 +92,8 @@ FED = {
 BEHIND_LEFT_OUT_BLOCKS = {"P_m", "B", "I_p_command", "I_q_command"}
 # States that act at a threshold alone, which small changes do not reach.
 BEHIND_THRESHOLDS = {name: {"pll.freezing.awake"} for name in ("gfl_l2ep", "gfl_l2ep_phasor")} | {
-    "csvgn1_phasor": {"first", "second"}  # T5 = 0 leaves out the lag between them and the outputs
+    "csvgn1_phasor": {"first", "second"},  # T5 = 0 leaves out the lag between them and the outputs
+    "induction_motor_phasor": {"relay.latch", "relay.opening"},
 }
 # Blocks of the generators and the POD that the literature lets one leave out with a time constant of zero.
 LEFT_OUT = {

@@ -19,8 +19,11 @@ def question_islands(draft: Draft, events: Sequence[tuple[Event, str]]) -> None:
     if draft.network is None or draft.found.network_failed or plan is None or draft.grid is None:
         return
     values = {name: plan.value(name) for name in plan.description.parameters}
+    plans = draft.system.components
     units = {
-        port.name: port.bus for port in draft.network.ports if port.name in draft.system.components
+        port.name: port.bus
+        for port in draft.network.ports
+        if port.name in plans and plans[port.name].kind != "load"
     }
     asked = {frozenset(part) for part in _without_unit(draft.network, units, values)}
     for time, group in groupby(

@@ -515,7 +515,11 @@ def _coupled(draft: Draft) -> list[set[str]]:
 def _small_units(draft: Draft) -> Iterator[UnusualValue]:
     """Ask about units in the power flow with a rating too small to affect the network."""
     ports = {p.name: p.bus for p in draft.network.ports} if draft.network else {}
-    plans = {name: plan for name, plan in draft.system.components.items() if name in ports}
+    plans = {
+        name: plan
+        for name, plan in draft.system.components.items()
+        if name in ports and plan.kind != "load"
+    }
     ratings = {
         name: S_n for name, plan in plans.items() if (S_n := value_of(plan, "S_n")) is not None
     }

@@ -100,7 +100,7 @@ def _step_up(draft: Draft, name: str, grid: ComponentPlan, where: str) -> Iterat
     ratings: dict[str, float] = {}
     for port in draft.network.ports:
         plan = draft.system.components.get(port.name)
-        S_n = None if plan is None else value_of(plan, "S_n")
+        S_n = None if plan is None or plan.kind == "load" else value_of(plan, "S_n")
         if S_n is not None:
             ratings[port.bus] = ratings.get(port.bus, 0.0) + S_n
     low, high = _STEP_UP

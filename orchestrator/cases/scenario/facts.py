@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 
+from fmus.grid.element_data import Load
 from orchestrator.cases.networks.load_models import in_words
+from orchestrator.cases.scenario.drawing_devices import LOAD, drawn_mw, with_motors
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import counted
 
@@ -21,6 +23,7 @@ class Facts:
     machines: int
     converters: int
     others: int  # devices of another kind, such as static var compensators
+    motors: int  # devices that draw power as loads
     governed: bool  # whether a machine has a governor
     load_mw: float  # active power of all loads, without what feeds in [MW]
     load_model: str
@@ -34,6 +37,7 @@ class Facts:
             for n, what in (
                 (self.machines, "machine"),
                 (self.converters, "converter"),
+                (self.motors, "motor"),
                 (self.others, "other device"),
             )
             if n
@@ -67,7 +71,8 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
     feeding = [name for name in units if flow.powers.get(name)]
     at_slack = [name for name in feeding if units[name] == units.get(wanted, wanted)]
     machines = [n for n in feeding if plans[n].kind == "machine"]
-    others = sum(plans[n].kind == "load" for n in feeding)
+    drawing = drawn_mw(plans)
+    others = sum(plans[n].kind == LOAD for n in feeding)
     magnitudes = [abs(flow.voltages[bus]) for bus in network.buses]
     loads = [
         (x, grid.number(f"{x.name}.scale") * grid.number(f"{x.name}.P")) for x in network.loads
@@ -80,18 +85,23 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
         buses=len(network.buses),
         machines=len(machines),
         converters=len(feeding) - len(machines) - others,
-        others=others,
+        others=sum(plans[n].kind == LOAD and n not in drawing for n in feeding),
+        motors=sum(n in drawing for n in feeding),
         governed=any(
             v.startswith("governor.T_") for n in machines for v in plans[n].description.variables
         ),
-        load_mw=sum(p for _, p in loads if p > 0),
-        load_model=in_words([load for load, p in loads if p > 0]),
+        load_mw=sum(p for _, p in loads if p > 0) + sum(drawing.values()),
+        load_model=with_motors(_laws([load for load, p in loads if p > 0]), plans),
         slack=tuple(
             (n, flow.powers[n].real * plans[n].number("S_n"), plans[n].number("S_n"))
             for n in at_slack
         ),
         voltages_pu=(min(magnitudes), max(magnitudes)),
     )
+
+
+def _laws(loads: list[Load]) -> str:
+    return in_words(loads) if loads else ""
 
 
 def rated_frequency(prepared: PreparedScenario) -> float | None:

@@ -35,6 +35,7 @@ from orchestrator.cases.scenario.case_network import (
     takes_network,
 )
 from orchestrator.cases.scenario.catalogue_fmus import PlannedFmu, build_fmu, plan_fmu
+from orchestrator.cases.scenario.drawing_devices import with_motors
 from orchestrator.cases.scenario.operating_point import power_flow_of
 from orchestrator.cases.scenario.run_plan import (
     check_length,
@@ -192,7 +193,8 @@ class PreparedScenario:
             if plan.kind == "machine"
         }
         network = Path(file).name if file else self.case.name
-        return {"network": network, "loads": in_words(loads) if loads else "", "machines": machines}
+        words = with_motors(in_words(loads) if loads else "", self.system.components)
+        return {"network": network, "loads": words, "machines": machines}
 
     @property
     def beside_file(self) -> BesideFile | None:

@@ -37,16 +37,19 @@ from orchestrator.cases.networks.psse.dyr_units import (
 )
 from orchestrator.cases.networks.psse.dyr_uses import record_uses
 from orchestrator.cases.networks.psse.load_records import recorded_laws, with_recorded_laws
+from orchestrator.cases.networks.psse.motor_loads import MotorLoad
 from orchestrator.cases.networks.psse.unused_models import unused_models
 from orchestrator.cases.networks.record_use import UseOfRecord
 from orchestrator.cases.networks.source_changes import Changes
 from orchestrator.cases.networks.source_ratings import with_needed_ratings
 from orchestrator.cases.networks.unit_row import UnitRow, checked
 from orchestrator.cases.questions.plausibility import question
+from orchestrator.cases.scenario.motor_components import motor_components, take_motors
 from orchestrator.core.errors import InputError, Problem, few
 
 UNIT_KINDS = ("sg", "gfor")  # first parts of the names of a unit's generator and converter
 _EXCITER = ".exciter"  # end of a scenario's key that names one
+_PHASOR = "_phasor"  # end of the names of phasor models
 _LIMITS = ("q_min_mvar", "q_max_mvar")
 _REMARKS = ("q_mvar", "name", "comment", "source")
 """Columns that say more to a reader; the power flow computes the reactive power."""
@@ -63,14 +66,7 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
     if table is None or (draft.found.network_failed and table.file is None):
         return {}
     try:
-        generation = _generation(draft, table)
-        rows = (
-            unit_rows(table, draft.given.directory, generation)
-            if table.dyr is None
-            else _rows_of_dyr(draft, table)
-        )
-        if table.dyr is None and table.file is None and draft.data is not None:
-            rows = with_infinite_buses(rows, draft.data.machines)
+        rows, motors = _rows(draft, table)
     except InputError as error:
         if draft.found.network_failed:
             return {}  # figures that the source would have given are missing
@@ -121,12 +117,23 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
                 if row.measured is not None:
                     draft.measured[name] = row.measured
                 draft.active_limits[name] = share * row.p_min_mw, share * row.p_max_mw
-    return components
+    return components | motor_components(draft, motors)
+
+
+def _rows(draft: Draft, table: UnitsTable) -> tuple[list[UnitRow], Sequence[MotorLoad]]:
+    """Return the units of the table, and the loads that are motors."""
+    generation = _generation(draft, table)
+    if table.dyr is not None:
+        return _rows_of_dyr(draft, table)
+    rows = unit_rows(table, draft.given.directory, generation)
+    if table.file is None and draft.data is not None:
+        rows = with_infinite_buses(rows, draft.data.machines)
+    return rows, ()
 
 
 def _of_parts(generator: str) -> str:
     """Return the generator of parts in the form of a generator's model."""
-    return f"synchronous_generator{'_phasor' if generator.endswith('_phasor') else ''}"
+    return f"synchronous_generator{_PHASOR if generator.endswith(_PHASOR) else ''}"
 
 
 def _generation(draft: Draft, table: UnitsTable) -> Mapping[str, Generation]:
@@ -252,8 +259,10 @@ def _known_rows(path: Path) -> list[Row]:
     return rows
 
 
-def _rows_of_dyr(draft: Draft, table: UnitsTable) -> list[UnitRow]:
-    """A unit for each machine of a RAW file, of what the DYR file names; a converter alone needs no record."""
+def _rows_of_dyr(draft: Draft, table: UnitsTable) -> tuple[list[UnitRow], Sequence[MotorLoad]]:
+    """A unit for each machine of a RAW file, of what the DYR file names, and its loads that are motors.
+
+    A converter alone needs no record."""
     if table.file is not None:
         raise InputError("'dyr' and 'file' both say what the units are; remove one of them")
     machines = draft.data.machines if draft.data else ()
@@ -286,7 +295,7 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> list[UnitRow]:
         idle,
         approximate=table.dyr_approximate,
     )
-    _account(draft, table, records, ours)
+    motors = _account(draft, table, records, ours)
     rows = with_choices(rows, replaced, chosen_parts(table))
     rows = without_idle_controls(rows, str(path), _choosing_exciters(draft, rows))
     machine_rows = [row for row in rows if row.label not in replaced]
@@ -308,14 +317,14 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> list[UnitRow]:
             changes.note(line, f"grid-following converter as {row.converter}: {text}")
     draft.found.questions += changes.listed()
     phasors = [row for row in rows if row.converter is not None]
-    if phasors and not table.generator.endswith("_phasor"):
+    if phasors and not table.generator.endswith(_PHASOR):
         raise InputError(
             f"{path}: the unit at bus {phasors[0].label} is the phasor model {phasors[0].converter}, and the generator "
             f"{table.generator!r} is none; phasor models go together: write generator = "
             "'synchronous_generator_phasor' in [units], converter = 'gfor_phasor' in [units], and model = "
             "'phasor_grid' in [components.grid] (`gfor new --models phasor`)"
         )
-    return rows
+    return rows, motors
 
 
 def _choosing_exciters(draft: Draft, rows: Sequence[UnitRow]) -> set[str]:
@@ -349,10 +358,10 @@ def _account(
     table: UnitsTable,
     records: Sequence[DynamicRecord],
     ours: Collection[tuple[int, str]],
-) -> None:
+) -> Sequence[MotorLoad]:
     """Note what became of each record of a DYR file, and ask about those of no machine that could matter.
 
-    ``ours``: machines that a converter of the case replaces."""
+    ``ours``: machines that a converter of the case replaces. Returns the loads that are motors."""
     machines = draft.data.machines if draft.data else ()
     uses = record_uses(
         records,
@@ -363,7 +372,9 @@ def _account(
         exciter=table.exciter,
         ours=ours,
     )
+    motors = take_motors(draft, table, records)
     taken = _with_recorded_loads(draft, records)
+    taken |= {(motor.record.file, motor.record.line) for motor in motors}
     uses = [
         replace(use, use=UseOfRecord.USED, why="", of_no_machine=False)
         if (use.file, use.line) in taken
@@ -373,7 +384,9 @@ def _account(
     draft.found.records += uses
     network = draft.given.case.network
     said = network.load_model if network else None
-    draft.found.questions += unused_models(records, uses, said)
+    among_phasors = table.generator.endswith(_PHASOR)
+    draft.found.questions += unused_models(records, uses, said, among_phasors=among_phasors)
+    return motors
 
 
 def _with_recorded_loads(

@@ -25,6 +25,7 @@ from orchestrator.cases.networks.psse.machine_model import (
     plant_of,
 )
 from orchestrator.cases.networks.psse.missing_models import (
+    LOAD,
     MissingModel,
     in_words,
     is_own,
@@ -63,6 +64,8 @@ def machine_models(
     names: dict[tuple[int, str], dict[str, str]] = {key: {} for key in at}
     left = {name.upper() for name in leaving_out}
     _refuse_absent(leaving_out, records)
+    # a load may have the identifier of the machine at its bus
+    records = [record for record in records if kind_of(record.name) != LOAD]
     labels = unit_labels(machines)
     of: dict[tuple[int, str], list[DynamicRecord]] = {key: [] for key in at}
     # machines whose own record no part stands for

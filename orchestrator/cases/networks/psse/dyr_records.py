@@ -95,13 +95,14 @@ def given_values(
             f"{', '.join(field.name for field in fields)}"
         )
     return {
-        field.name: _number(record, field, text)
+        field.name: number_of_field(record, field, text)
         for field, text in zip(fields, record.values, strict=True)
         if not field.is_text
     }
 
 
-def _number(record: DynamicRecord, field: DyrField, text: str) -> float:
+def number_of_field(record: DynamicRecord, field: DyrField, text: str) -> float:
+    """Return a field's number; an `InputError` where it is none."""
     try:
         value = float(text.upper().replace("D", "E"))
     except ValueError:

@@ -6,6 +6,7 @@ from fmus.grid_following.dyr_fields import FIELDS, MODEL
 from orchestrator.cases.networks.psse.dyr_records import EVENT, DynamicRecord
 from orchestrator.cases.networks.psse.machine_model import MANUAL
 from orchestrator.cases.networks.psse.missing_models import (
+    LOAD,
     OF_MACHINES,
     RESTS,
     is_resting,
@@ -60,7 +61,10 @@ def _use_of(
 ) -> tuple[UseOfRecord, str, bool]:
     """Return what became of a record, why, and whether it is of no machine."""
     key = record.bus, record.machine
-    if key in machines:
+    of_load = kind_of(record.name) == LOAD  # whose identifier is a load's
+    if of_load and record.name in left:
+        return UseOfRecord.NOT_USED, "dyr_leave_out names it", False
+    if key in machines and not of_load:
         if record.name in left:
             return UseOfRecord.NOT_USED, "dyr_leave_out names it", False
         if is_resting(record.name):
@@ -69,7 +73,7 @@ def _use_of(
             return UseOfRecord.NOT_USED, "its machine has no exciter", False
         stand_in = f"approximated as {MODEL}" if approximate and record.name in FIELDS else ""
         return UseOfRecord.USED, stand_in, False
-    if key in idle:
+    if key in idle and not of_load:
         return UseOfRecord.NOT_USED, "its machine is out of service", False
     if record.name == EVENT:
         told = f"an event of ANDES, of {record.machine}; [scenarios] has events"

@@ -11,10 +11,12 @@ from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS, DyrRecord
 from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
 from orchestrator.cases.networks.psse.load_records import LOAD_RECORDS
+from orchestrator.cases.networks.psse.motor_loads import MOTOR_NAMES
 
 _LIBRARY = "PSS/E's model library as PowerWorld's and NEPLAN's guides and ANDES' reader describe it"
 _REGFM = "WECC's specification of REGFM_A1"
 _LOADS = "GridPACK's reader and model"
+_MOTORS = "PowerWorld's guide to PSS/E's load models, and STEPS' reader"
 _GENERIC = (
     "WECC's generic converters: fields as ANDES and GridPACK read them, diagrams of WECC's guide"
 )
@@ -51,6 +53,10 @@ def known_records() -> list[KnownRecord]:
     found += [
         KnownRecord(name, "load", "load_model", _LOADS, "an exponent other than 0, 1, 2 near v_0")
         for name in LOAD_RECORDS
+    ]
+    found += [
+        KnownRecord(name, "load", record.part, _MOTORS, "; ".join(_limits(record)))
+        for name, record in MOTOR_NAMES.items()
     ]
     found += [
         KnownRecord(name, _KINDS[record.kind], record.part, _GENERIC, "; ".join(_of_plant(name)))

@@ -78,18 +78,24 @@ def with_recorded_laws(load: Load, law: RecordedLaw) -> Load:
     return replace(load, active=law.active, reactive=law.reactive, k_pf=law.k_pf, k_qf=law.k_qf)
 
 
-def _law_for(load: FileLoad, records: Sequence[DynamicRecord]) -> RecordedLaw | None:
-    numbers = dict(
-        zip(LOAD_RECORDS, (load.bus, load.owner, load.zone, load.area, None), strict=True)
-    )
-    for kind in LOAD_RECORDS:
+def records_for(
+    load: FileLoad, records: Sequence[DynamicRecord], names: Sequence[str]
+) -> Iterator[DynamicRecord]:
+    """Yield the records that name a load, the one that goes first before others.
+
+    ``names``: of the records of a load, an owner, a zone, an area, and of all loads."""
+    numbers = (load.bus, load.owner, load.zone, load.area, None)
+    for kind, number in zip(names, numbers, strict=True):
         of_kind = [record for record in records if record.name == kind]
         for identifier in (load.name, _EVERY):
             for record in of_kind:
-                names = numbers[kind] is None or record.bus == numbers[kind]
-                if names and record.machine == identifier:
-                    return _law_of(record)
-    return None
+                if number in (None, record.bus) and record.machine == identifier:
+                    yield record
+
+
+def _law_for(load: FileLoad, records: Sequence[DynamicRecord]) -> RecordedLaw | None:
+    record = next(records_for(load, records, LOAD_RECORDS), None)
+    return None if record is None else _law_of(record)
 
 
 def _law_of(record: DynamicRecord) -> RecordedLaw | None:

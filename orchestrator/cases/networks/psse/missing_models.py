@@ -12,6 +12,7 @@ from orchestrator.cases.networks.psse.raw_network import Machine
 
 MACHINE = "machine"
 DEVICE = "device"
+LOAD = "load"
 
 UNKNOWN = "unknown"
 OF_MACHINES = (

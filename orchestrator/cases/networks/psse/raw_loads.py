@@ -50,6 +50,7 @@ def read_loads(net: RawTables) -> None:
             owner=net.group(record, 11, "OWNER"),
             p_mw=pl + current.real + admittance.real * v**2,
             q_mvar=ql + current.imag - admittance.imag * v**2,
+            drawn=power,
         )
         net.file_loads.append((one, bus, power.real < 0))
 

@@ -70,7 +70,8 @@ def bus_of_unit(name: str, machines: Iterable[Machine]) -> str:
 class FileLoad:
     """One load in service [MW, Mvar], by what a record of dynamics data may name it.
 
-    ``load``: name of the case's load, which all loads of a bus are together that draw, or that feed."""
+    ``load``: name of the case's load, which all loads of a bus are together that draw, or that feed; ``drawn``: its
+    part of that [MW, Mvar], without an admittance that stands there as a shunt."""
 
     load: str
     bus: int
@@ -80,6 +81,7 @@ class FileLoad:
     owner: int
     p_mw: float
     q_mvar: float
+    drawn: complex = 0j
 
 
 @dataclass(frozen=True)

@@ -60,6 +60,7 @@ def _read_numbers(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
 def values_of_record(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
     given = _read_numbers(record, known)
     found = dict.fromkeys(known.lacks, 0.0) | dict.fromkeys(known.without, False)
+    found |= dict.fromkeys(known.switched_on, True)
     for field in (field for field in known.fields if not field.is_text):
         value = given[field.name]
         if field.nothing_without and given[field.nothing_without] == 0:

@@ -11,6 +11,7 @@ from orchestrator.cases.networks.psse.missing_models import (
     RESTS,
     kind_of,
 )
+from orchestrator.cases.networks.psse.motor_loads import MOTOR_NAMES
 from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
 from orchestrator.cases.networks.source_changes import Changes
 from orchestrator.core.errors import Problem, counted, few
@@ -27,16 +28,23 @@ _VALUES = 14
 _LAWS = {0.0: "p", 1.0: "i", 2.0: "z"}
 _SUM = 1e-3  # by which shares may miss 1
 _MOST_BUSES = 8
+_PHASORS = (
+    '; it is an induction motor, a phasor model: write models = "phasor" at the top of the case'
+)
+_NO_LOAD = "; the file has no load in service that it names and that draws active power"
 
 
 def unused_models(
     records: Sequence[DynamicRecord],
     uses: Sequence[RecordUse],
     said: LoadModelTable | None = None,
+    *,
+    among_phasors: bool = False,
 ) -> list[Problem]:
     """One question for each model that matters, with the lines of all its records.
 
-    ``said``: how the case's loads follow the voltage; records that say the same are not asked about."""
+    ``said``: how the case's loads follow the voltage; records that say the same are not asked about.
+    ``among_phasors``: whether the case's models are phasor models, which motors are alone."""
     if not records:
         return []
     changes = Changes(records[0].file)
@@ -54,6 +62,8 @@ def unused_models(
         )
         if kind in _MATTER and not is_said:
             remedy = f"; to take it for all loads, write {law} in [network]" if law else ""
+            if name in MOTOR_NAMES:
+                remedy = _NO_LOAD if among_phasors else _PHASORS
             places = few(
                 dict.fromkeys(record.line_of_dc or str(record.bus) for record in own), _MOST_BUSES
             )
