@@ -27,6 +27,7 @@ from orchestrator.cases.questions.contradictions import contradictions
 from orchestrator.core.errors import MOST_PROBLEMS, TOO_MANY, CaseError, InputError, Problem, few
 from orchestrator.core.foreign_files import check_name, cleaned, steering_in, why_refused
 from orchestrator.core.late import Late
+from orchestrator.core.options import Option
 from orchestrator.core.question_kinds import by_kind
 from orchestrator.core.toml_files import Table, fault_of, read_toml
 from orchestrator.core.uncollected import uncollected
@@ -106,13 +107,13 @@ class Case(CaseDefinition):
         unknown = [name for name in scenarios if name not in self.scenarios]
         has = f"the case has: {', '.join(self.scenarios)}"
         problems += [
-            Problem("--scenario", f"there is no scenario {name!r}; {has}") for name in unknown
+            Problem(Option.SCENARIO, f"there is no scenario {name!r}; {has}") for name in unknown
         ]
         doubles = [name for name, count in Counter(scenarios).items() if count > 1]
         twice = "is chosen more than once; name it once"
-        problems += [Problem("--scenario", f"the scenario {name!r} {twice}") for name in doubles]
+        problems += [Problem(Option.SCENARIO, f"the scenario {name!r} {twice}") for name in doubles]
         if unknown or doubles:
-            raise CaseError(str(self.path), problems)
+            raise CaseError(self.source, problems)
         prepared, questions, named = [], [*self.questions], mentions.Named()
         for name in scenarios or self.scenarios:
             preparer = self._preparer(name, overrides, parameters)
@@ -151,7 +152,7 @@ class Case(CaseDefinition):
                 Problem(by_text[first].place, f"questioned besides: {line}", kind, besides=True)
                 for first, line in by_kind(by_text).items()
             ]
-            raise CaseError(str(self.path), [*problems, *asked])
+            raise CaseError(self.source, [*problems, *asked])
         if scenarios and self.numbered:
             others = event_tables.other_scenarios(preparer.draft, scenarios)
             prepared[-1] = prepared[-1] and replace(
@@ -338,7 +339,7 @@ class Case(CaseDefinition):
         components = preparer.assemble().components
         problems = [*self.problems, *preparer.problems]
         if problems:
-            raise CaseError(str(self.path), problems)
+            raise CaseError(self.source, problems)
         return {name: (preparer.draft.tables[name], plan) for name, plan in components.items()}
 
     def _of_kind(

@@ -14,10 +14,11 @@ from orchestrator.cases.networks.data import NetworkData
 from orchestrator.cases.networks.measured_point import MeasuredPoint
 from orchestrator.cases.networks.record_use import RecordUse
 from orchestrator.core.errors import MOST_PROBLEMS, TOO_MANY, CaseError, ErrorKind, Problem
+from orchestrator.core.options import Option
 from orchestrator.systems.coupling.system import System
 
 Locate = Callable[..., str]
-COMMAND_LINE = "--set"
+COMMAND_LINE = Option.SET
 
 
 @dataclass(frozen=True)

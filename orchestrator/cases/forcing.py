@@ -9,11 +9,12 @@ from orchestrator.cases.case import Case
 from orchestrator.cases.form.schema import BusFaultTable, CaseTable, ForcingTable, LineFaultTable
 from orchestrator.cases.networks.data import bus_name
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.core.units import to_unit
 
 _BEGIN = 1.0  # time at which an event in words begins unless it says another [s]
 _FORMS = {
-    "force": (
+    Option.FORCE: (
         ForcingTable,
         "forcing",
         re.compile(
@@ -22,7 +23,7 @@ _FORMS = {
         ),
         "'UNIT FREQUENCY AMPLITUDE', such as 'sg35 0.8 Hz 2 %'; a reference ('sg35.exciter.V_ref'), a shape ('square')",
     ),
-    "fault": (
+    Option.FAULT: (
         BusFaultTable,
         "bus_fault",
         re.compile(
@@ -49,8 +50,8 @@ def with_events(case: Case, forcings: Sequence[str], faults: Sequence[str]) -> C
     if not (forcings or faults):
         return case
     events = [
-        *(event_of("force", text) for text in forcings),
-        *(event_of("fault", text) for text in faults),
+        *(event_of(Option.FORCE, text) for text in forcings),
+        *(event_of(Option.FAULT, text) for text in faults),
     ]
     scenarios = {
         name: table.model_copy(update={"events": None})
@@ -58,8 +59,8 @@ def with_events(case: Case, forcings: Sequence[str], faults: Sequence[str]) -> C
     }
     table: CaseTable = case.table.model_copy(update={"events": events, "scenarios": scenarios})
     said = [
-        f'{option} "{text}"'
-        for option, texts in (("force", forcings), ("fault", faults))
+        f'{word} "{text}"'
+        for word, texts in (("force", forcings), ("fault", faults))
         for text in texts
     ]
     return replace(case, table=table, events_given=tuple(said))
@@ -77,13 +78,13 @@ def _reason(detail: Any) -> str:
 EventInWords = ForcingTable | BusFaultTable | LineFaultTable
 
 
-def event_of(option: str, text: str) -> EventInWords:
+def event_of(option: Option, text: str) -> EventInWords:
     """An event in words: ``sg35.exciter.V_ref 0.8 Hz 0.02 pu square from 2 s``, ``bus_9, 150 ms, opens line_7_9``."""
     kind, name, form, how = _FORMS[option]
     parts = form.fullmatch(" ".join(text.split()))
     if parts is None:
         raise InputError(
-            f"--{option} {text!r}: it is not of the form {how} and a begin ('from 2 s') may be added"
+            option + f" {text!r}: it is not of the form {how} and a begin ('from 2 s') may be added"
         )
     given = {key: word for key, word in parts.groupdict().items() if word is not None}
     try:
@@ -93,11 +94,11 @@ def event_of(option: str, text: str) -> EventInWords:
         if along is not None:
             kind, name, given = LineFaultTable, "line_fault", _along_a_line(given, along)
         table: EventInWords = kind(type=name, time=time, **given)
-        return table.asked_as(f"--{option} {text!r}")
+        return table.asked_as(option + f" {text!r}")
     except ValueError as error:  # pydantic's and ours
         details = error.errors() if hasattr(error, "errors") else []
         reasons = [_reason(one) for one in details] or [str(error)]
-        raise InputError(f"--{option} {text!r}: {'; '.join(reasons)}") from error
+        raise InputError(option + f" {text!r}: {'; '.join(reasons)}") from error
 
 
 def _along_a_line(given: Mapping[str, str], along: re.Match[str]) -> dict[str, str]:

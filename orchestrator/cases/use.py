@@ -5,6 +5,7 @@ from pathlib import Path
 from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.form.names import close_names
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.devices.acceptance.checks.subject import OperatingAt, Use
 from orchestrator.systems.coupling.system import ComponentPlan
 
@@ -60,16 +61,16 @@ def _scenario(case: Case, component: str, wanted: str | None) -> str:
     if wanted is None:
         if not having:
             raise InputError(
-                f"{case.path}: every scenario removes component {component!r}; add one that keeps it to the case"
+                f"{case.source}: every scenario removes component {component!r}; add one that keeps it to the case"
             )
         return having[0]
     if wanted not in case.scenarios:
         raise InputError(
-            f"{case.path}: there is no scenario {wanted!r}; scenarios with {component!r}: {known}"
+            f"{case.source}: there is no scenario {wanted!r}; scenarios with {component!r}: {known}"
         )
     if wanted not in having:
         raise InputError(
-            f"{case.path}: scenario {wanted!r} removes component {component!r}; scenarios that have it: {known}"
+            f"{case.source}: scenario {wanted!r} removes component {component!r}; scenarios that have it: {known}"
         )
     return wanted
 
@@ -83,12 +84,14 @@ def _component(case: Case, wanted: str | None, fmu: Path) -> str:
         if wanted not in case.table.components:
             every = list(case.table.components)
             hint = close_names(wanted, every, f"there are: {', '.join(every)}")
-            raise InputError(f"{case.path}: there is no component {wanted!r}; {hint}")
+            raise InputError(f"{case.source}: there is no component {wanted!r}; {hint}")
         return wanted
     same = [n for n, path in files.items() if path.exists() and path.resolve() == fmu.resolve()]
     if len(same) != 1:
         found = "no component is" if not same else f"{', '.join(same)} are all"
         raise InputError(
-            f"{case.path}: {found} {fmu.name}; say which one it is with --component (components that are FMUs: {known})"
+            f"{case.source}: {found} {fmu.name}; say which one it is with "
+            + Option.COMPONENT
+            + f" (components that are FMUs: {known})"
         )
     return same[0]

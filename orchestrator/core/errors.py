@@ -1,7 +1,6 @@
 """The errors a user can meet. Each message says what failed, where, the value seen, the rule and the remedy."""
 
 import copyreg
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -9,7 +8,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-from orchestrator.core.spelling import for_python, spelled
+from orchestrator.core.given_files import ShownFile
+from orchestrator.core.options import Option
+from orchestrator.core.spelling import Text, for_python, joined, parts_of, spelled
 
 NOT_MET = 3  # exit code where a requirement is not met, or is not known to be
 INTERRUPTED = 130  # exit code after Ctrl-C
@@ -98,7 +99,6 @@ class CosimError(Exception):
 
     exit_code = 1
     kind = ErrorKind.OTHER
-    words_of_others = ""  # part of the message that an FMU or another program wrote, which no reader's words replace
 
     def __init__(self, message: str = "", *, kind: ErrorKind | None = None) -> None:
         super().__init__(message)
@@ -111,7 +111,13 @@ class CosimError(Exception):
 
     def __str__(self) -> str:
         # not that of another base, such as KeyError, which quotes
-        return spelled(Exception.__str__(self), self.words_of_others)
+        return spelled(self.message)
+
+    @property
+    def message(self) -> str:
+        """The message as it was put together, with its options as values."""
+        first = self.args[0] if self.args else ""
+        return first if isinstance(first, str) else Exception.__str__(self)
 
     def _render_traceback_(self) -> list[str]:
         """Return what a notebook shows of an uncaught error: the sentence, without the calls inside of this package."""
@@ -177,11 +183,14 @@ class Problem:
     kind: ErrorKind = ErrorKind.VALUES
     besides: bool = False  # a question that stands beside a failure, as its likely reason
     topic: QuestionTopic | None = None  # of a question that several elements can raise
-    words_of_others: str = ""  # part of the text that an FMU or another program wrote
+
+    @property
+    def message(self) -> str:
+        """The problem at its place, with the options as values."""
+        return Text(self.place, ": ", self.text) if self.place else self.text
 
     def __str__(self) -> str:
-        text = f"{self.place}: {self.text}" if self.place else self.text
-        return spelled(text, self.words_of_others)
+        return spelled(self.message)
 
     def as_json(self) -> dict[str, str | bool]:
         return {
@@ -198,13 +207,28 @@ MOST_PROBLEMS = 200
 TOO_MANY = Problem("", "there are more problems than are listed; mend these first")
 
 
-_GIVEN = re.compile(r"--(set|step|stop|vary|scenario|fault|force)\b")
+_GIVEN = {
+    Option.SET,
+    Option.STEP,
+    Option.STOP,
+    Option.VARY,
+    Option.SCENARIO,
+    Option.FAULT,
+    Option.FORCE,
+}
 """Places of problems that lie in what a call was given."""
 
 
+def _option_at(problem: Problem) -> str:
+    return parts_of(problem.place)[0]
+
+
 def _for_python(problem: Problem) -> str:
-    text = str(problem)
-    return f"values: {text.removeprefix('values ')}" if problem.place.startswith("--set ") else text
+    """Return a problem in what a call was given; values are named as one mapping."""
+    if _option_at(problem) is not Option.SET:
+        return str(problem)
+    _, *key = parts_of(problem.place)
+    return spelled(Text("values: ", "".join(key).lstrip(), ": ", problem.text))
 
 
 class CaseError(InputError):
@@ -213,16 +237,18 @@ class CaseError(InputError):
     def __init__(self, source: str, problems: Sequence[Problem]) -> None:
         self.problems = tuple(problems)
         kinds = {problem.kind for problem in problems}
-        self.words_of_others = next(filter(None, (p.words_of_others for p in problems)), "")
         asked = sum(problem.besides for problem in problems)
         count = counted(len(problems) - asked, "problem")
         count += f", and {counted(asked, 'question')} besides" if asked else ""
-        message = f"{source}: {count}\n" + "\n".join(f"  - {problem}" for problem in problems)
-        super().__init__(message, kind=kinds.pop() if len(kinds) == 1 else ErrorKind.VALUES)
+        lines = joined(
+            "\n  - ",
+            [f"{ShownFile.of(source)}: {count}", *(problem.message for problem in problems)],
+        )
+        super().__init__(lines, kind=kinds.pop() if len(kinds) == 1 else ErrorKind.VALUES)
 
     def __str__(self) -> str:
         """Give the message; where what Python gave is all that is wrong, the file is not blamed."""
-        if for_python() and all(_GIVEN.match(one.place) for one in self.problems):
+        if for_python() and all(_option_at(one) in _GIVEN for one in self.problems):
             return "\n".join(_for_python(one) for one in self.problems)
         return super().__str__()
 
@@ -266,7 +292,6 @@ class ComponentError(CosimError):
             log,
             time,
         )
-        self.words_of_others = log
         when = "" if time is None else f" at t = {time:.6g} s"
         said = log or "the FMU logged no text"
         super().__init__(
@@ -306,7 +331,6 @@ class EndedError(CosimError):
             time,
             ended_at,
         )
-        self.words_of_others = log
         said = f" (it says: {log})" if log else ""
         super().__init__(
             f"component {component!r}: it ended its simulation at t = {ended_at:.6g} s by itself, which is no error"

@@ -44,8 +44,13 @@ def check_regular(path: Path | str, label: str = "") -> None:
     kind = next((word for is_one, word in _KINDS if is_one(mode)), "")
     if kind:
         raise InputError(
-            f"{label} {path}: it is {kind}, and no file; write its content into a file, and give that".lstrip()
+            _labelled(label, path)
+            + f": it is {kind}, and no file; write its content into a file, and give that"
         )
+
+
+def _labelled(label: str, path: Path | str) -> str:
+    return label + f" {path}" if label else str(path)
 
 
 def check_name(path: Path | str, label: str = "") -> None:
@@ -56,8 +61,9 @@ def check_name(path: Path | str, label: str = "") -> None:
         byte = ord(found.group()) - 0xDC00
         shown = text.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
         raise InputError(
-            f"{label} {shown}: its name has the byte {byte:#04x}, which is no UTF-8, and neither manifests nor FMUs "
-            "can name it; rename the file or the folder".lstrip()
+            _labelled(label, shown)
+            + f": its name has the byte {byte:#04x}, which is no UTF-8, and neither manifests nor FMUs "
+            "can name it; rename the file or the folder"
         )
 
 

@@ -1,62 +1,12 @@
-"""Options that an error names: spelt for the command line while it runs, and as keywords for Python."""
+"""Texts that name options, which the command line and Python spell in different ways.
 
-import re
-from collections.abc import Iterator
+A text is put together from words and values: ``Option.OUT + f" {folder}: nothing can be written there"``. Each value
+knows its two spellings, so that nothing has to be searched for in the words: a user's own text stays as it is.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-
-_KEYWORDS = {
-    "set": "values",
-    "range": "frequencies",
-    "min-damping": "least_damping",
-    "rank": "ranked",
-    "place": "places",
-    "event": "events",
-    "channel": "channels",
-    "out": "folder",
-    "dest": "folder",
-    "checkpoint": "checkpoints",
-    "resume": "checkpoints",
-    "parameter": "parameters",
-    "text": "texts",
-    "try": "steps",
-    "federate": "federates",
-    "engine helics": "federates",
-}
-"""Of options that are not spelt as their keywords."""
-
-_CALLS = (
-    "run",
-    "modes",
-    "linearize",
-    "steps",
-    "sweep",
-    "sensitivities",
-    "interactions",
-    "site",
-    "screen",
-    "compare",
-    "source",
-    "identify",
-    "design",
-    "nyquist",
-    "build",
-    "check",
-    "info",
-)
-"""Commands that Python has as functions of the same name."""
-
-_KEPT = re.compile(
-    r"[^\s'\"]*given[/\\][0-9a-f]{16}[/\\](case|binding|points)\.(?:toml|csv)(?:, line (\d+))?"
-)
-_COMMAND_ONLY = {"json", "with-linear-model"}
-_TYPED = {"modes": {"component", "set", "out"}, "design": {"points"}}
-"""Options that the call of the same name lacks: the command stays as it is typed at a terminal."""
-_QUOTED = re.compile(
-    r"`[^`]*`"
-    r"""|(?<!\w)'(?:[^'\\\n]|\\.)*'(?!\w)|(?<!\w)"(?:[^"\\\n]|\\.)*"(?!\w)"""
-    r"|(?<![\w/\\-])--(engine helics|[a-z][a-z-]*)"
-)
-"""A command, a value of the user's as Python writes it, or an option, which alone is spelt anew."""
+from typing import Any, Self
 
 _commanded = list[None]()  # one for each that asks for options
 
@@ -76,47 +26,91 @@ def for_python() -> bool:
     return not _commanded
 
 
-def keyword(option: str) -> str:
-    return _KEYWORDS.get(option, option.replace("-", "_"))
+class Text(str):
+    """Words with options between them.
+
+    As a string it is the command line's, wherever it is printed or kept; `spelled` gives it as its reader needs it.
+    Texts are joined by ``+`` and `joined`, which keep the options; an f-string makes one plain string of them.
+
+    Attributes
+    ----------
+    parts : tuple of str
+        Plain words, and each `Spelling` between them.
+    """
+
+    parts: tuple[str, ...]
+
+    def __new__(cls, *parts: str) -> Self:
+        kept = tuple(one for part in parts for one in parts_of(part))
+        text = super().__new__(cls, "".join(kept))
+        text.parts = kept
+        return text
+
+    def __getnewargs__(self) -> tuple[Any, ...]:
+        return self.parts
+
+    def __add__(self, other: str) -> "Text":
+        return Text(self, other)
+
+    def __radd__(self, other: str) -> "Text":
+        return Text(other, self)
 
 
-def spelled(text: str, words_of_others: str = "") -> str:
-    """Spell the options that a text names, such as ``--out``, for who reads it.
+class Spelling(Text):
+    """One thing that has two spellings, such as an option.
 
-    What was given as tables is named as it was given, and not by the file that keeps it. Commands of other programs,
-    quoted values and ``words_of_others``, which the text contains, stay as they are: a log of an FMU may name options
-    of its own."""
-    before, found, after = (
-        text.rpartition(words_of_others) if "--" in words_of_others else ("", "", text)
-    )
-    return f"{_spelled(before)}{found}{_spelled(after)}"
+    Parameters
+    ----------
+    typed
+        As it is typed at a command line.
+    python
+        As it is written in Python.
+    """
+
+    python: str
+
+    def __new__(cls, typed: str, python: str) -> Self:
+        text = str.__new__(cls, typed)
+        text.python = python
+        text.parts = (text,)
+        return text
+
+    def __getnewargs__(self) -> tuple[Any, ...]:
+        return str(self), self.python
+
+    def __getstate__(self) -> None:
+        """Nothing beside what it is made from: its only part is itself."""
 
 
-def _spelled(text: str) -> str:
-    text = _KEPT.sub(
-        lambda m: m[1] + (f", row {int(m[2]) - 1}" if (m[2] or "1") != "1" else ""), text
-    )
-    return text if _commanded or "--" not in text else _QUOTED.sub(_in_python, text)
+def parts_of(text: str) -> tuple[str, ...]:
+    """Return the words and the options of a text; a plain string is one part."""
+    return text.parts if isinstance(text, Text) else (text,)
 
 
-def _in_python(found: re.Match[str]) -> str:
-    if found[1]:
-        return keyword(found[1])
-    if not found[0].startswith("`"):
-        return found[0]
-    if found[0].startswith("`--"):
-        return f"`{spelled(found[0][1:-1])}`"
-    command, *options = found[0][1:-1].split(" --")
-    words = command.split()
-    if not options or len(words) < 2 or words[0] != "gfor":
-        return found[0]
-    given = [option.partition(" ") for option in options]
-    if any(name in _TYPED.get(words[1], ()) for name, _, _ in given):
-        return found[0]
-    if words[1] in _CALLS and not any(name in _COMMAND_ONLY for name, _, _ in given):
-        values = [
-            f"{keyword(name)}={value!r}" if value else f"{keyword(name)}=True"
-            for name, _, value in given
-        ]
-        return f"`{words[1]}({', '.join(values)})`"
-    return found[0]  # Python has no such function: to be typed at a terminal
+def spelled(text: str) -> str:
+    """Return a text as a plain string for who reads it: with options, or with Python's keywords in their place."""
+    return "".join(map(_spelled, parts_of(text)))
+
+
+def _spelled(part: str) -> str:
+    return part.python if isinstance(part, Spelling) and for_python() else part
+
+
+def stored(text: Text) -> list[list[str]]:
+    """Return a text as JSON's types: each part, and beside it its spelling in Python where that is another."""
+    return [
+        [str(part), part.python] if isinstance(part, Spelling) else [part] for part in text.parts
+    ]
+
+
+def restored(parts: Iterable[Sequence[str]]) -> Text:
+    """Return the text that `stored` made these parts of.
+
+    Raises a `TypeError` if they are none."""
+    return Text(*(Spelling(*part) if len(part) > 1 else "".join(part) for part in parts))
+
+
+def joined(between: str, texts: Iterable[str]) -> str:
+    """Return texts in one, with their options, as ``between.join(texts)`` would without them."""
+    parts = [part for text in texts for part in (between, text)]
+    return Text(*parts[1:])

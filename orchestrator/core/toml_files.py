@@ -15,6 +15,7 @@ from orchestrator.core.foreign_files import (
     visible,
     why_refused,
 )
+from orchestrator.core.given_files import ShownFile
 
 MOST_BYTES = 16 * 1024**2  # of one file: a case with 100,000 events has about 12 MB
 
@@ -34,37 +35,40 @@ def read_toml(
 
     Raises an `InputError` if there is no such file, it cannot be read, it is larger than `MOST_BYTES`, or it is not
     TOML."""
-    source = f"{option} {path}".lstrip()
+    shown = str(ShownFile.of(path))
+    source = option + f" {shown}" if option else shown
     try:
         check_regular(path, option)
         size = path.stat().st_size
         if size > MOST_BYTES:
             raise InputError(
-                f"{source}: {subject} has {size} bytes; at most {MOST_BYTES} are read, so move tables of numbers into "
+                source
+                + f": {subject} has {size} bytes; at most {MOST_BYTES} are read, so move tables of numbers into "
                 "files of their own"
             )
         text = path.read_text(encoding="utf-8")
         found = parsed(text)
     except OSError as error:
         raise InputError(
-            f"{source}: {subject} cannot be read: {error.strerror}; {remedy}"
+            source + f": {subject} cannot be read: {error.strerror}; {remedy}"
         ) from error
     except tomllib.TOMLDecodeError as error:
         last = f"at the end of line {len(text.rstrip().splitlines())}, the last one"
         said = str(error).replace("at end of document", last)
         raise InputError(
-            f"{source}: it is not a TOML file: {said}; write NAME = VALUE, texts in quotes, and close every bracket "
+            source
+            + f": it is not a TOML file: {said}; write NAME = VALUE, texts in quotes, and close every bracket "
             "and quote"
         ) from error
     except UnicodeDecodeError as error:
-        raise InputError(f"{source}: it is not a TOML file: {error}") from error
+        raise InputError(source + f": it is not a TOML file: {error}") from error
     except ValueError as error:  # of `parsed`, or Python's own, which converts at most 4,300 digits
         raise InputError(
-            f"{source}: a whole number in it has too many digits to be read; shorten it"
+            source + ": a whole number in it has too many digits to be read; shorten it"
         ) from error
     except RecursionError as error:
         raise InputError(
-            f"{source}: its brackets nest too deeply to be read; {subject} nests at most five"
+            source + f": its brackets nest too deeply to be read; {subject} nests at most five"
         ) from error
     if not steering and may_steer(text):
         _check_characters(source, found)
@@ -74,7 +78,7 @@ def read_toml(
 def _check_characters(source: str, table: dict[str, Any]) -> None:
     for place, character in steering_in(table):
         where = ".".join(map(str, place))
-        raise InputError(f"{source}: {visible(where)}: {why_refused(character)}")
+        raise InputError(source + f": {visible(where)}: {why_refused(character)}")
 
 
 def parsed(text: str) -> dict[str, Any]:

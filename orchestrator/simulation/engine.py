@@ -8,6 +8,7 @@ from typing import Protocol, Self
 from fmus.toolchain.plugins import PlugIns
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.devices.fmi.component import Component
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.observers import Observer
@@ -41,7 +42,10 @@ class Federates:
     def __post_init__(self) -> None:
         if self.broker is not None and self.port is not None:
             raise InputError(
-                "--broker names a broker that runs, --broker-port has gfor start one; give only one of them"
+                Option.BROKER
+                + " names a broker that runs, "
+                + Option.BROKER_PORT
+                + " has gfor start one; give only one of them"
             )
         both = sorted(set(self.names) & set(self.external))
         if both:

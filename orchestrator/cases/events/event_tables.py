@@ -18,6 +18,7 @@ from orchestrator.cases.form import schema
 from orchestrator.cases.form.names import close_names, hint_at
 from orchestrator.cases.settings.assignment import convert_value
 from orchestrator.core.errors import InputError, Problem, QuestionTopic
+from orchestrator.core.options import Option
 from orchestrator.systems.coupling import events as coupled
 from orchestrator.systems.coupling.clock import Clock
 from orchestrator.systems.coupling.events import Event
@@ -57,7 +58,7 @@ def scenario_events(
             if checked is not None and _is_point(draft, clock, event.time, "the event", where):
                 events.append((checked, where))
     where = (
-        "--stop"
+        Option.STOP
         if stop != draft.given.case.solver.stop_time
         else draft.given.place("solver", "stop_time")
     )
@@ -105,7 +106,7 @@ def _note_late(draft: Draft, time: float, stop: float, where: str) -> None:
         draft.note(where, f"{text}; give it an earlier time, or the run a later solver.stop_time")
     else:
         topic = QuestionTopic("an event after the stop")
-        draft.found.questions.append(Problem(where, f"{text} (--stop)", topic=topic))
+        draft.found.questions.append(Problem(where, (f"{text} (" + Option.STOP + ")"), topic=topic))
 
 
 def _endless(table: schema.EventTable, stop: float) -> Iterator[str]:
@@ -187,7 +188,7 @@ def forcing_events(
     if plan is None:
         if table.component in draft.given.scenario.remove:
             if table.place:
-                text = f"{table.place} cannot act: the scenario has no {table.component}"
+                text = table.place + f" cannot act: the scenario has no {table.component}"
                 topic = QuestionTopic("an event at a removed component", table.component)
                 draft.found.questions.append(Problem("", text, topic=topic))
         else:

@@ -121,8 +121,9 @@ def note_conflicts(draft: Draft, events: Sequence[tuple[Event, str]], clock: Clo
         for what in _set_by(event):
             first = seen.setdefault((clock.index(event.time, "the event"), what), (event, where))
             if first[0] is not event:
-                text = f"{what} is set at {event.time:g} s by {first[1]} already, and only one of the two could hold"
-                draft.note(where, f"{text}; remove one, or give it another time")
+                text = f"{what} is set at {event.time:g} s by " + first[1]
+                text += " already, and only one of the two could hold"
+                draft.note(where, text + "; remove one, or give it another time")
     obsolete = _replaced_ends(draft, events)
     return [event for event, _ in events if id(event) not in obsolete]
 

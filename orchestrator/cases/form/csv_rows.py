@@ -9,6 +9,7 @@ from pathlib import Path
 
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import check_regular, read_text, visible
+from orchestrator.core.given_files import ShownFile
 from orchestrator.core.units import LARGEST
 
 
@@ -35,50 +36,51 @@ def rows_of(path: Path, columns: Sequence[str]) -> list[Row]:
     Raises an `InputError` if the file or one of the columns is missing, a column stands twice, columns are separated by
     semicolons or tabs, the file is not text in UTF-8, or it has more than `MOST_ROWS` rows."""
     path = seen_from_here(path)
+    shown = ShownFile.of(path)
     if not path.is_file():
         wanted = (
             f"it should hold the columns {', '.join(columns)}"
             if columns
             else "give the path of a .csv"
         )
-        raise InputError(f"{path}: there is no such file; {wanted}")
+        raise InputError(f"{shown}: there is no such file; {wanted}")
     try:
         text = visible(read_text(path, encoding="utf-8-sig"))  # spreadsheets write the mark
         reader = csv.DictReader(io.StringIO(text), restval="")
         names = reader.fieldnames or ()
-        _check_names(path, names)
+        _check_names(shown, names)
         missing = [c for c in columns if c not in names]
         if missing:
             raise InputError(
-                f"{path}: column {', '.join(missing)} is missing; it should hold {', '.join(columns)}"
+                f"{shown}: column {', '.join(missing)} is missing; it should hold {', '.join(columns)}"
             )
         rows = [
-            row | {PLACE: f"{path}, line {n}"}
+            row | {PLACE: shown.at_line(n)}
             for n, row in enumerate(islice(reader, MOST_ROWS + 1), start=2)
         ]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(
-            f"{path}: it cannot be read as a table: {error}; save it as CSV in UTF-8"
+            f"{shown}: it cannot be read as a table: {error}; save it as CSV in UTF-8"
         ) from error
     if len(rows) > MOST_ROWS:
         raise InputError(
-            f"{path}: it has more than {MOST_ROWS} rows, which is the most that a table may have"
+            f"{shown}: it has more than {MOST_ROWS} rows, which is the most that a table may have"
         )
     return rows
 
 
-def _check_names(path: Path, names: Sequence[str]) -> None:
+def _check_names(file: ShownFile, names: Sequence[str]) -> None:
     """A reader would take the last of two columns in silence."""
     for mark, word in ((";", "semicolons"), ("\t", "tabs")):
         if len(names) == 1 and mark in names[0]:
             raise InputError(
-                f"{path}, line 1: its columns are separated by {word}; separate them by commas, and write decimals "
+                f"{file.at_line(1)}: its columns are separated by {word}; separate them by commas, and write decimals "
                 "with a point"
             )
     for k, name in enumerate(names):
         if name and name in names[:k]:
             raise InputError(
-                f"{path}, line 1: the column {name!r} stands twice; leave one of them out"
+                f"{file.at_line(1)}: the column {name!r} stands twice; leave one of them out"
             )
 
 

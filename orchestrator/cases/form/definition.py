@@ -11,6 +11,7 @@ from orchestrator.cases.form.locate import place_in
 from orchestrator.cases.form.parameter_files import ParameterFile
 from orchestrator.cases.form.schema import CaseTable, ComponentTable, ScenarioTable
 from orchestrator.core.errors import Problem
+from orchestrator.core.given_files import ShownFile
 
 if TYPE_CHECKING:
     from orchestrator.cases.flow.sharing import SharingRule
@@ -51,6 +52,11 @@ class CaseDefinition:
     injections: bool = False
     # variables, by ``component.variable``, that a study varies: their values are meant, whatever is usual
     varied: frozenset[str] = frozenset()
+
+    @property
+    def source(self) -> str:
+        """The file as errors name it, or ``case`` for tables that Python gave."""
+        return str(ShownFile.of(self.path))
 
     @property
     def content(self) -> bytes:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from orchestrator.cases.form.schema import Value
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 
 _NAME = re.compile(r"[\w+-][\w.+-]*")  # what a device may be called: its name is that of a folder
 
@@ -116,10 +117,11 @@ def _bindings(names: Sequence[str], given: Sequence[str]) -> dict[str, Path]:
             name, path = names[0], Path(text)
         else:
             form = f"with several devices write NAME=FILE.toml, with NAME one of {', '.join(names)}"
-            raise InputError(f"--binding {text}: it does not say whose it is; {form}")
+            raise InputError(Option.BINDING + f" {text}: it does not say whose it is; {form}")
         if name in found:
             raise InputError(
-                f"--binding {text}: {name} has {found[name]} already; a device has one binding"
+                Option.BINDING
+                + f" {text}: {name} has {found[name]} already; a device has one binding"
             )
         found[name] = path
     return found
@@ -129,6 +131,6 @@ def _whose(text: str, names: Sequence[str]) -> tuple[str | None, str]:
     name, sign, rest = text.partition(":")
     if sign and len(names) > 1 and name not in names:
         raise InputError(
-            f"--set {text}: there is no device {name!r}; the devices are {', '.join(names)}"
+            Option.SET + f" {text}: there is no device {name!r}; the devices are {', '.join(names)}"
         )
     return (name, rest) if sign and name in names else (None, text)

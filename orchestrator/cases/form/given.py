@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from orchestrator.cases.form.locate import FROM_TABLES
 from orchestrator.core.asked import Value, number_between, number_in, path, plain_value, seen
 from orchestrator.core.errors import InputError
+from orchestrator.core.given_files import DIGITS, FOLDER
 from orchestrator.core.late import pd
 
 if TYPE_CHECKING:
@@ -147,7 +148,7 @@ def keep(text: str, name: str) -> Path:
     from fmus.toolchain.cache import cache_directory  # noqa: PLC0415 - a record needs no cache
     from orchestrator.core.safe_files import write_text  # noqa: PLC0415 - as above
 
-    place = cache_directory("given") / hashlib.sha256(text.encode()).hexdigest()[:16] / name
+    place = cache_directory(FOLDER) / hashlib.sha256(text.encode()).hexdigest()[:DIGITS] / name
     if not place.is_file():
         write_text(place, text)
     return place

@@ -8,6 +8,7 @@ from orchestrator.cases.form.names import TWINS
 from orchestrator.cases.form.parameter_files import ParameterFile
 from orchestrator.cases.form.schema import CaseTable, PlotTable, Value
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 
 KINDS = ("emt", "phasor")
 
@@ -22,7 +23,7 @@ def kind_wanted(
     layers = [file.values for file in parameters] + [dict(overrides or {})]
     given = [layer[MODELS] for layer in layers if MODELS in layer]
     if given and given[-1] not in KINDS:
-        raise InputError(f"--set {MODELS}={given[-1]}: it must be emt or phasor")
+        raise InputError(Option.SET + f" {MODELS}={given[-1]}: it must be emt or phasor")
     return str(given[-1]) if given else None
 
 

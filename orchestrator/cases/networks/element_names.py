@@ -128,9 +128,10 @@ class ElementNames:
         meant = self.meant.get(_plain(name)) or self.meant.get(_plain(name.removeprefix("bus_")))
         found = [one for one in meant or () if one in allowed]
         if len(found) > 1:
-            where = f"{option} {name!r}: " if option else f"{name!r}: "
+            where = option + f" {name!r}" if option else f"{name!r}"
             raise InputError(
-                f"{where}the file has {len(found)} elements of this name: {few(found, _SHOWN)}; give one of these"
+                where
+                + f": the file has {len(found)} elements of this name: {few(found, _SHOWN)}; give one of these"
             )
         return found[0] if found else name
 

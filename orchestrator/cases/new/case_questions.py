@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from orchestrator.core.errors import Problem
+from orchestrator.core.options import Option
 from orchestrator.core.question_kinds import by_kind
 
 LINE_OF_TEXT = re.compile(r"line (\d+)")  # of the text, as places of questions begin
@@ -21,7 +22,7 @@ def with_questions(
         ("" if one.place.startswith("line ") else f"{one.place}: ") + one.text: one
         for one in questions
     }
-    for first, shown in by_kind(told, "gfor modes CASE --details").items():
+    for first, shown in by_kind(told, ("gfor modes CASE " + Option.DETAILS)).items():
         place = _line_of(told[first], lines, sources)
         above.setdefault(place, []).extend(
             textwrap.wrap(

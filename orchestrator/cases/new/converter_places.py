@@ -12,6 +12,7 @@ from orchestrator.cases.networks.psse.raw_file import read_file
 from orchestrator.cases.new.wanted_case import WantedConverter
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError, few
+from orchestrator.core.options import Option
 
 _CONVERTER = "gfor"
 _INJECTION = "injection"
@@ -99,7 +100,7 @@ def place_for(
         hint = close_names(
             bus_name(wanted.bus), [*network.buses, *called], f"there are: {few(network.buses, 8)}"
         )
-        raise InputError(f"--converter: the network has no bus {wanted.bus!r}; {hint}")
+        raise InputError(Option.CONVERTER + f": the network has no bus {wanted.bus!r}; {hint}")
     (bus,) = names
     plans = base.system.components
     units = {port.name: port.bus for port in network.ports if port.name in plans}
@@ -113,7 +114,7 @@ def place_for(
     if wanted.less not in units:
         known = f"the network's units: {', '.join(units)}"
         raise InputError(
-            f"--converter: there is no unit {wanted.less!r} to feed less; "
+            Option.CONVERTER + f": there is no unit {wanted.less!r} to feed less; "
             f"{close_names(str(wanted.less), units, known)}"
         )
     rating = plans[wanted.less].number("S_n")
@@ -121,25 +122,30 @@ def place_for(
     sharing = [one for one in others if one.less == wanted.less]
     if sharing and (wanted.replaces or sharing[-1].wanted.replaces):
         raise InputError(
-            f"--converter: {wanted.less} is replaced, and another converter names it too; write "
+            Option.CONVERTER
+            + f": {wanted.less} is replaced, and another converter names it too; write "
             f"'less {wanted.less}' at both, or another machine"
         )
     power -= sum(one.wanted.p_mw for one in sharing)
     if wanted.replaces:
         if wanted.less in at_slack:
             raise InputError(
-                f"--converter: instead of {wanted.less}: it is at the slack; replace another, or name "
-                "another slack by --slack"
+                Option.CONVERTER
+                + f": instead of {wanted.less}: it is at the slack; replace another, or name "
+                "another slack by " + Option.SLACK
             )
         return replace(found, less=wanted.less, before_mw=power, rating_mva=rating)
     if wanted.less not in at_slack and abs(wanted.p_mw - power) < 1e-6:
         raise InputError(
-            f"--converter: {wanted.less} would feed nothing; write 'instead of {wanted.less}'"
+            Option.CONVERTER
+            + f": {wanted.less} would feed nothing; write 'instead of {wanted.less}'"
         )
     if wanted.p_mw > power + 1e-6:
         most = f"give the converter at most {power:.5g} MW, or leave the rest to the slack without 'less'"
         raise InputError(
-            f"--converter: {wanted.less} feeds {power:.5g} MW and cannot feed {wanted.p_mw:g} MW less; {most}"
+            Option.CONVERTER
+            + f": {wanted.less} feeds {power:.5g} MW and cannot feed {wanted.p_mw:g} MW "
+            f"less; {most}"
         )
     if wanted.less in at_slack:
         return found  # the slack feeds what is left, whatever it is given

@@ -24,6 +24,7 @@ from orchestrator.cases.new.refusal import of_what_was_given
 from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import CaseError, InputError, Problem
+from orchestrator.core.options import Option
 from orchestrator.core.uncollected import uncollected
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.devices.fmi.description import FmuDescription
@@ -105,11 +106,16 @@ def _check_controls(wanted: WantedCase, sources: Mapping[str, Path]) -> None:
     if wanted.move_controls and "raw" not in sources:
         named = ", ".join(path.name for path in sources.values())
         raise InputError(
-            f"--move-controls is for taps and switched shunts of a RAW file, and the network is {named}; leave it out"
+            Option.MOVE_CONTROLS
+            + f" is for taps and switched shunts of a RAW file, and the network is {named}; "
+            "leave it out"
         )
     if wanted.move_controls and wanted.kind != "phasor":
         raise InputError(
-            "--move-controls: taps and switched shunts move in phasor models; write --models phasor, or leave it out"
+            Option.MOVE_CONTROLS
+            + ": taps and switched shunts move in phasor models; write "
+            + Option.MODELS
+            + " phasor, or leave it out"
         )
 
 
@@ -161,9 +167,13 @@ def _described(path: Path, binding: Path | None, *, is_dll: bool) -> FmuDescript
         if v.name not in found.variables or found.variables[v.name].unit not in (None, "", "pu")
     ]
     if other:
-        way = "say which of its variables it is with --binding; `gfor fmu bind` drafts one"
         way = (
-            "lay a circuit around the DLL in a device's file, and give that to --dll"
+            "say which of its variables it is with "
+            + Option.BINDING
+            + "; `gfor fmu bind` drafts one"
+        )
+        way = (
+            ("lay a circuit around the DLL in a device's file, and give that to " + Option.DLL)
             if is_dll
             else way
         )

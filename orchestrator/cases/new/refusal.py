@@ -7,20 +7,21 @@ from dataclasses import replace
 from pathlib import Path
 
 from orchestrator.core.errors import CaseError, Problem
+from orchestrator.core.options import Option
 
 _PLACE = re.compile(r"(?:line \d+, )?(\w+)(?:\.(\w+))?(?:\.|$)")
 """A key of the case, with the line that it would have."""
 
 _OPTIONS = {
-    ("power_flow", "slack"): "--slack",
-    ("power_flow", "reactive_limits"): "--reactive-limits",
-    ("network", "frequency"): "--frequency",
-    ("network", "leave_out"): "--leave-out",
-    ("network", "move_controls"): "--move-controls",
-    ("network", "keep_load_parts"): "--no-load-parts",
-    ("units", "replace"): "--replace",
-    ("units", "dyr_leave_out"): "--dyr-leave-out",
-    ("units", "dyr_approximate"): "--dyr-approximate",
+    ("power_flow", "slack"): Option.SLACK,
+    ("power_flow", "reactive_limits"): Option.REACTIVE_LIMITS,
+    ("network", "frequency"): Option.FREQUENCY,
+    ("network", "leave_out"): Option.LEAVE_OUT,
+    ("network", "move_controls"): Option.MOVE_CONTROLS,
+    ("network", "keep_load_parts"): Option.NO_LOAD_PARTS,
+    ("units", "replace"): Option.REPLACE,
+    ("units", "dyr_leave_out"): Option.DYR_LEAVE_OUT,
+    ("units", "dyr_approximate"): Option.DYR_APPROXIMATE,
 }
 """Key of the case → the option that writes it."""
 
@@ -72,5 +73,5 @@ def _option(table: str, key: str, options: Mapping[str, Sequence[str]]) -> str:
     """Return an option with what was given, as it was typed; "" for a key that no option writes."""
     name = _OPTIONS.get((table, key), "")
     if table == _DEVICES and key != _GRID:
-        name = "--converter"
+        name = Option.CONVERTER
     return " ".join([name, *map(shlex.quote, options.get(name, ()))])

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.core.units import to_unit
 
 
@@ -53,11 +54,11 @@ class WantedCase:
     def options(self) -> dict[str, tuple[str, ...]]:
         """Return the values that were given by option."""
         return {
-            "--slack": (self.slack,) if self.slack else (),
-            "--frequency": (self.frequency,) if self.frequency else (),
-            "--leave-out": self.leave_out,
-            "--dyr-leave-out": self.dyr_leave_out,
-            "--replace": self.replace,
+            Option.SLACK: (self.slack,) if self.slack else (),
+            Option.FREQUENCY: (self.frequency,) if self.frequency else (),
+            Option.LEAVE_OUT: self.leave_out,
+            Option.DYR_LEAVE_OUT: self.dyr_leave_out,
+            Option.REPLACE: self.replace,
         }
 
 
@@ -80,22 +81,25 @@ def read_converter(text: str) -> WantedConverter:
         elif re.fullmatch(r"bus_\w+", part):
             key, rest = "bus", part
         else:
-            raise InputError(f"--converter {text!r}: {part!r} is not understood; {how}")
+            raise InputError(Option.CONVERTER + f" {text!r}: {part!r} is not understood; {how}")
         if key in found:
-            raise InputError(f"--converter {text!r}: {key} is given twice; {how}")
+            raise InputError(Option.CONVERTER + f" {text!r}: {key} is given twice; {how}")
         found[key] = part if quantity is not None else rest.strip()
     missing = {"bus": "bus", "MVA": "rating in MVA", "MW": "power in MW"}
     lacks = [words for key, words in missing.items() if key not in found]
     if lacks:
-        raise InputError(f"--converter {text!r}: the {' and the '.join(lacks)} is missing; {how}")
+        raise InputError(
+            Option.CONVERTER + f" {text!r}: the {' and the '.join(lacks)} is missing; {how}"
+        )
     rating, power = to_unit(found["MVA"], "MVA"), to_unit(found["MW"], "MW")
     if not 0 < rating < math.inf or not abs(power) <= rating:
         raise InputError(
-            f"--converter {text!r}: {power:g} MW with a rating of {rating:g} MVA; {how}"
+            Option.CONVERTER + f" {text!r}: {power:g} MW with a rating of {rating:g} MVA; {how}"
         )
     if 0 < abs(power) < 0.01 * rating:
         raise InputError(
-            f"--converter {text!r}: {power:g} MW is {100 * power / rating:.2g} % of its rating; is "
+            Option.CONVERTER
+            + f" {text!r}: {power:g} MW is {100 * power / rating:.2g} % of its rating; is "
             f"{1000 * power:g} MW meant? A converter that only holds the voltage has 0 MW"
         )
     return WantedConverter(found["bus"], rating, power, found.get("less"), replaces)

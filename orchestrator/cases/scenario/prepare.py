@@ -52,6 +52,7 @@ from orchestrator.cases.settings.imperfection_tables import disturb_connections
 from orchestrator.cases.settings.layers import value_layers
 from orchestrator.cases.settings.references import references_of
 from orchestrator.core.errors import InputError, Problem, QuestionTopic
+from orchestrator.core.options import Option
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.instance import is_ours
@@ -245,7 +246,7 @@ class Preparer:
         self._planned: dict[str, PlannedFmu] = {}
         outside = frozenset(overrides).union(*(file.values for file in parameters)) - {MODELS}
         given = DraftInput(
-            str(case.path),
+            case.source,
             case.table,
             name=name,
             scenario=scenario,
@@ -428,9 +429,13 @@ class Preparer:
         if not is_ours(self.draft.given.directory / table.file):
             self.draft.note(
                 self.draft.given.place("components", name, "isolated"),
-                f"this file wants {table.file} to run in gfor's own process, where it can do whatever you can; if you "
-                "trust the FMU, say so by --trust-fmus (in Python load(case, trust_fmus=True)), else remove "
-                "'isolated = false', and it runs in a process that is closed off",
+                (
+                    f"this file wants {table.file} to run in gfor's own process, where it can do "
+                    "whatever you can; if you trust the FMU, say so by "
+                    + Option.TRUST_FMUS
+                    + " (in Python load(case, trust_fmus=True)), else remove 'isolated = false', "
+                    "and it runs in a process that is closed off"
+                ),
             )
 
     def _parts(self, name: str, table: ComponentTable) -> tuple[tuple[str, str], ...]:

@@ -9,6 +9,7 @@ from orchestrator.cases.form.schema import LONGEST_STEP, ForcingTable
 from orchestrator.cases.questions.mentions import shown_signals
 from orchestrator.cases.scenario.scheduling import schedule_of
 from orchestrator.core.errors import InputError, Problem, QuestionTopic
+from orchestrator.core.options import Option
 from orchestrator.systems.coupling.clock import Clock
 from orchestrator.systems.coupling.schedule import Schedule
 
@@ -25,7 +26,7 @@ def clock_of(draft: Draft, step_size: float | None) -> Clock | None:
             )
         return Clock(step_size if step_size is not None else draft.given.case.solver.step_size)
     except InputError as error:
-        draft.note("--step", str(error))
+        draft.note(Option.STEP, str(error))
         return None
 
 

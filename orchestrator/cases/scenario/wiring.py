@@ -7,6 +7,7 @@ from fmus.toolchain.catalogue import model_names
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.scenario.measured_points import measured_sources
 from orchestrator.core.errors import InputError, Problem, QuestionTopic, few
+from orchestrator.core.options import Option
 
 _PHASOR_PORT = ("e_re", "e_im", "y_re", "y_im")  # what a device gives to a network of phasors
 
@@ -96,7 +97,9 @@ def _remedy(model: str) -> str:
         return "it has no phasor form: take another model, or model = 'grid' for the network and EMT models for all"
     needed = f"an FMU needs the outputs {', '.join(_PHASOR_PORT)} for that"
     return (
-        f"{needed}, or give the network the model 'grid', a case with `models` by --set models=emt"
+        f"{needed}, or give the network the model 'grid', a case with `models` by "
+        + Option.SET
+        + " models=emt"
     )
 
 

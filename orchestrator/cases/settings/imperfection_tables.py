@@ -12,6 +12,7 @@ from orchestrator.cases.form import schema
 from orchestrator.cases.form.names import close_names
 from orchestrator.cases.form.values import convert
 from orchestrator.core.errors import InputError, Problem, QuestionTopic
+from orchestrator.core.options import Option
 from orchestrator.core.toml_files import fault_of
 from orchestrator.devices.fmi.description import VariableInfo
 from orchestrator.systems.coupling.clock import Clock
@@ -81,7 +82,7 @@ def note_long_delay(draft: Draft, delay: float, stop: float, where: str) -> None
         draft.note(where, f"{text}; give a shorter delay, or the run a later solver.stop_time")
     else:
         topic = QuestionTopic("a delay after the stop")
-        draft.found.questions.append(Problem(where, f"{text} (--stop)", topic=topic))
+        draft.found.questions.append(Problem(where, (f"{text} (" + Option.STOP + ")"), topic=topic))
 
 
 def _overridden(

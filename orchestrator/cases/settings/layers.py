@@ -19,7 +19,7 @@ class OptionValues(ParameterFile):
         return cls(Path(COMMAND_LINE), "", dict(values))
 
     def place(self, key: str) -> str:
-        return f"{COMMAND_LINE} {key}"
+        return COMMAND_LINE + f" {key}"
 
 
 def joined_values(layers: Sequence[ParameterFile]) -> dict[str, Value]:
@@ -50,5 +50,5 @@ def value_layers(
     )
     for file in parameters:
         add(file.values, file.place)
-    add(overrides, lambda key: f"{COMMAND_LINE} {key}")
+    add(overrides, lambda key: COMMAND_LINE + f" {key}")
     return layers

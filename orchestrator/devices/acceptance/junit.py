@@ -4,6 +4,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from orchestrator.core.errors import InputError, ResultsError
+from orchestrator.core.options import Option
 from orchestrator.core.safe_files import write_bytes
 from orchestrator.devices.acceptance.checks.base import Verdict
 from orchestrator.devices.acceptance.runner import AcceptanceReport
@@ -43,4 +44,4 @@ def write_junit(report: AcceptanceReport, path: Path) -> None:
             path, b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(suite, encoding="utf-8")
         )
     except ResultsError as error:
-        raise InputError(f"--junit {error}") from error
+        raise InputError(Option.JUNIT + f" {error}") from error

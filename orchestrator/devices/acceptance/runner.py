@@ -25,6 +25,7 @@ from orchestrator.core.errors import (
     InputError,
     UnsupportedFmuError,
 )
+from orchestrator.core.options import Option
 from orchestrator.core.safe_files import file_hash
 from orchestrator.devices.acceptance.checks import base
 from orchestrator.devices.acceptance.checks.all import CHECKS, ORDER
@@ -172,7 +173,9 @@ def check_fmu(
         raise InputError(f"there is no check {', '.join(map(repr, unknown))}; there are: {known}")
     if "binding" in only and binding is None:
         raise InputError(
-            "the check 'binding' needs a binding; give one with --binding (`gfor fmu bind` drafts one)"
+            "the check 'binding' needs a binding; give one with "
+            + Option.BINDING
+            + " (`gfor fmu bind` drafts one)"
         )
     if fmu.is_dir():
         raise InputError(f"{fmu}: it is a folder; give the path of an .fmu")

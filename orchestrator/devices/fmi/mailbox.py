@@ -12,6 +12,7 @@ import numpy as np
 
 from fmus.toolchain.compiler import compile_here
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.devices.fmi.interrupts import calls
 
 _SOURCE = Path(__file__).with_name("mailbox.c")
@@ -94,8 +95,8 @@ def mailbox_library() -> Any:
         library = ctypes.PyDLL(str(compile_here(_SOURCE)))
     except (OSError, RuntimeError) as error:
         raise InputError(
-            f"the mailbox to an FMU's own process is compiled, and {error}; if you trust the FMU, set isolated = false "
-            "in the case and give --trust-fmus"
+            f"the mailbox to an FMU's own process is compiled, and {error}; if you trust "
+            "the FMU, set isolated = false in the case and give " + Option.TRUST_FMUS
         ) from error
     address, size = ctypes.c_void_p, ctypes.c_size_t
     library.mailbox_size.restype = library.mailbox_offset.restype = library.client_size.restype = (

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError, ResultsError
+from orchestrator.core.options import Option
 from orchestrator.core.safe_files import write_text
 from orchestrator.devices.binding.draft import draft_binding
 from orchestrator.devices.fmi.description import FmuDescription, read_declared
@@ -40,5 +41,5 @@ def bind(fmu: str | Path | FmuDescription, out: str | Path | None = None) -> str
         try:
             write_text(place, text)
         except ResultsError as error:
-            raise InputError(f"--out {error}") from error
+            raise InputError(Option.OUT + f" {error}") from error
     return text

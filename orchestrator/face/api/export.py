@@ -8,6 +8,7 @@ from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.asked import require_known
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.core.safe_files import made_folder
 from orchestrator.face.api.comtrade import export_comtrade
 from orchestrator.face.api.dll import export_dll
@@ -118,5 +119,5 @@ def write_ssp(prepared: PreparedScenario, target: Path) -> None:
         write_archive(target, members)
     except OSError as error:
         raise InputError(
-            f"--out {target}: it cannot be written: {error.strerror}; choose another place"
+            Option.OUT + f" {target}: it cannot be written: {error.strerror}; choose another place"
         ) from error

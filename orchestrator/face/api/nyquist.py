@@ -12,6 +12,7 @@ from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.asked import names, number_in
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.core.toml_files import read_toml
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.devices.fmi.vendor_files import DEVICE_ENDING, DLL_ENDINGS
@@ -146,8 +147,12 @@ class Asked:
         self._of_case = _is_case(network or device)
         if network is None and not self._of_case and rest.get("scr") is None:
             raise InputError(
-                f"{device}: give its network as well: a scan, a short-circuit ratio by --scr, or a case with --bus or "
-                "--component"
+                f"{device}: give its network as well: a scan, a short-circuit ratio by "
+                + Option.SCR
+                + ", or a case with "
+                + Option.BUS
+                + " or "
+                + Option.COMPONENT
             )
         self._device = Path(device) if network is not None or not self._of_case else None
         self._case, self._scenario, self._given, self._trust = (
@@ -227,7 +232,10 @@ class Asked:
                 return float(values.get(variable, start_of(fmu, variable)))
 
         else:
-            what = f"--retune: {self._device or result.loop.device.name} is a scan and has no parameters"
+            what = (
+                Option.RETUNE
+                + f": {self._device or result.loop.device.name} is a scan and has no parameters"
+            )
             raise InputError(f"{what}; give the FMU, DLL or case itself")
 
         def acts(x: Parameter) -> bool:

@@ -13,7 +13,7 @@ from orchestrator.core.arrays import Complex
 from orchestrator.core.errors import CosimError, InputError
 from orchestrator.core.late import Late, pd, xr
 from orchestrator.core.safe_files import made_folder
-from orchestrator.core.spelling import spelled
+from orchestrator.core.spelling import joined, spelled
 from orchestrator.core.truth import NoTruth
 from orchestrator.linear.signals.identification import IdentifiedMode
 from orchestrator.linear.spectra.modes import ZERO, Mode, eigenvalues
@@ -326,7 +326,7 @@ class Run(NoTruth):
     def verdict(self) -> str:
         """The verdict in one sentence, as ``gfor run`` has it."""
         answer = answer_of_run.of_run(self.result)
-        return spelled(f"{answer.verdict}: {answer.remark}" if answer.remark else answer.verdict)
+        return spelled(joined(": ", filter(None, (answer.verdict, answer.remark))))
 
     @property
     def linear(self) -> xr.Dataset | None:

@@ -68,7 +68,7 @@ def diagram(scenario: Scenario) -> dict[str, Any] | None:
     unknown = [bus for bus in given if bus not in network.buses]
     if unknown:
         raise InputError(
-            f"{prepared.case.path}: [diagram] positions: there is no bus {unknown[0]!r}; "
+            f"{prepared.case.source}: [diagram] positions: there is no bus {unknown[0]!r}; "
             + close_names(unknown[0], network.buses, f"there are: {few(network.buses, 8)}")
         )
     at = [given.get(bus, tuple(xy)) for bus, xy in zip(network.buses, points.tolist(), strict=True)]

@@ -13,6 +13,7 @@ import numpy as np
 
 from orchestrator.core.arrays import Matrix
 from orchestrator.core.errors import ComponentError
+from orchestrator.core.options import Option
 from orchestrator.devices.fmi.instance import is_ours
 from orchestrator.devices.fmi.port import without_binding
 from orchestrator.linear.models.coupled_state import CoupledState
@@ -106,9 +107,10 @@ def _standstill(blocks: Blocks, foreign: Sequence[str]) -> str:
         if rows.any():
             states = ", ".join(s for s, still in zip(c.states, rows, strict=True) if still)
             return (
-                f"component {name!r} stands still over a communication step of {blocks.step_size:g} s ({states}), "
-                "whatever its states and inputs are, so its linear model is none. Is its control sampled? Take a step "
-                "that contains a sample, or identify it with --black-box"
+                f"component {name!r} stands still over a communication step of "
+                f"{blocks.step_size:g} s ({states}), whatever its states and inputs are, so "
+                "its linear model is none. Is its control sampled? Take a step that contains "
+                "a sample, or identify it with " + Option.BLACK_BOX
             )
     return ""
 

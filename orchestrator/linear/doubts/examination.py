@@ -14,6 +14,7 @@ import scipy.sparse.linalg as spla
 from numpy.typing import NDArray
 
 from orchestrator.core.errors import CosimError, InputError
+from orchestrator.core.options import Option, command
 from orchestrator.linear.doubts.coupled_response import confirmed
 from orchestrator.linear.doubts.linearity import Doubt, doubts, tell
 from orchestrator.linear.doubts.slow_modes import tell_slow_modes
@@ -143,12 +144,15 @@ def _step_warnings(
     )
     if short is None:
         return (
-            f"{text}; no shorter step that was tried comes nearer, so that the derivatives which the components "
-            "give disagree with their steps, or the coupling is unstable at all of them: compare with "
-            "`gfor export linear --continuous`",
+            (
+                f"{text}; no shorter step that was tried comes nearer, so that the "
+                "derivatives which the components give disagree with their steps, or the "
+                "coupling is unstable at all of them: compare with "
+                + command("export linear", Option.CONTINUOUS)
+            ),
         )
     if worst.is_lost and _is_slow(worst):
-        raise InputError(f"{text}; {_take(short)}")
+        raise InputError(f"{text}; " + _take(short))
     return (f"{text}; {_take(short)}",)
 
 
@@ -161,7 +165,9 @@ def _advice(master: Master, system: LinearModel, pairs: Sequence[Pair]) -> str:
 
 def _take(step: float) -> str:
     return (
-        f"take a step of {step:g} s (`--step {step:g}`, or the case's solver.step_size): there the coupling is stable "
+        f"take a step of {step:g} s (`"
+        + Option.STEP
+        + f" {step:g}`, or the case's solver.step_size): there the coupling is stable "
         f"and no mode that was compared is moved by more than {100 * MOVED:g} %"
     )
 

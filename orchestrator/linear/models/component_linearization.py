@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Matrix
 from orchestrator.core.errors import AnalysisError
+from orchestrator.core.options import Option
 from orchestrator.devices.fmi.component import Component, RealBatch
 from orchestrator.devices.fmi.linear_model import EmbeddedModel
 from orchestrator.linear.models.differences import PerturbedStep
@@ -163,8 +164,8 @@ def linearize_by_derivatives(
     rates = component.description.rates
     if not component.description.gives_directional_derivatives:
         raise AnalysisError(
-            f"component {component.name!r}: its FMU gives no directional derivatives; native FMUs do (--native), "
-            "or linearise by perturbation"
+            f"component {component.name!r}: its FMU gives no directional derivatives; "
+            "native FMUs do (" + Option.NATIVE + "), or linearise by perturbation"
         )
     n = len(states)
     entries = (*exchange.inputs.names, *inputs)
@@ -281,10 +282,13 @@ def check_derivatives(
     part = np.where(wrong, differs / np.maximum(np.abs(one), np.finfo(float).tiny), 0.0)
     i, k = divmod(int(np.nanargmax(part)), part.shape[1])
     raise AnalysisError(
-        f"component {component.name!r}: its FMU's directional derivatives are wrong in {wrong.sum()} of {wrong.size} "
-        f"elements: that of {unknowns[i]} by {knowns[k]} is given as {given[i, k]:.6g}, but changing {knowns[k]} by "
-        f"{SIZES[0]:g} changes {unknowns[i]} by {one[i, k]:.6g} per unit; linearise by perturbation (without "
-        "--directional), and have the FMU's derivatives corrected"
+        f"component {component.name!r}: its FMU's directional derivatives are wrong "
+        f"in {wrong.sum()} of {wrong.size} elements: that of {unknowns[i]} by "
+        f"{knowns[k]} is given as {given[i, k]:.6g}, but changing {knowns[k]} by "
+        f"{SIZES[0]:g} changes {unknowns[i]} by {one[i, k]:.6g} per unit; linearise "
+        "by perturbation (without "
+        + Option.DIRECTIONAL
+        + "), and have the FMU's derivatives corrected"
     )
 
 

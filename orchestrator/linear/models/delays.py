@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.core.arrays import Matrix, Vector
+from orchestrator.core.options import Option
 from orchestrator.linear.models.held_inputs import over_held_inputs
 from orchestrator.linear.models.linear_model import DELAYED
 from orchestrator.systems.coupling.imperfections import DropOut, Noise, Quantisation
@@ -145,9 +146,13 @@ def highest_hz(link: WireLink, step_size: float | None) -> float:
 def too_long(links: Iterable[WireLink], top_hz: float, step_size: float | None) -> list[str]:
     """Delays that the linear model does not have up to the range's top [Hz], in words."""
     return [
-        f"connection {link.name}: the linear model has the delay of {link.delay:g} s up to {bound:.3g} Hz; what it "
-        f"shows from there to {top_hz:g} Hz are not the system's modes, and others may be missing; simulate, or take a "
-        "--range that ends there"
+        (
+            f"connection {link.name}: the linear model has the delay of {link.delay:g} s "
+            f"up to {bound:.3g} Hz; what it shows from there to {top_hz:g} Hz are not the "
+            "system's modes, and others may be missing; simulate, or take a "
+            + Option.RANGE
+            + " that ends there"
+        )
         for link in links
         if (bound := highest_hz(link, step_size)) < top_hz
     ]

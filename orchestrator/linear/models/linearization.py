@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from orchestrator.core.errors import AnalysisError
+from orchestrator.core.options import Option, command
 from orchestrator.linear.models.blocks import Blocks, linearize_within
 from orchestrator.linear.models.delays import DelayLine, continuous_line, delay_line
 from orchestrator.linear.models.linear_model import DELAYED, HELD, Equations, Indices, LinearModel
@@ -38,10 +39,13 @@ def compose(blocks: Blocks, schedule: Schedule, *, within_period: bool = False) 
     blocks.check_made_for(schedule)
     if blocks.period > 1 and not within_period:
         raise AnalysisError(
-            f"sampled components ({', '.join(blocks.sampled)}) repeat only after {blocks.period} communication steps "
-            f"of {blocks.step_size:g} s ({blocks.period * blocks.step_size:g} s), and the linear model that is asked "
-            "for is of a single step, which differs from the next; `gfor modes`, `gfor run` and `gfor sweep` take the "
-            "whole period, `gfor modes --black-box` measures such a component through its port"
+            f"sampled components ({', '.join(blocks.sampled)}) repeat only after "
+            f"{blocks.period} communication steps of {blocks.step_size:g} s ("
+            f"{blocks.period * blocks.step_size:g} s), and the linear model that is asked "
+            "for is of a single step, which differs from the next; `gfor modes`, `gfor "
+            "run` and `gfor sweep` take the whole period, "
+            + command("modes", Option.BLACK_BOX)
+            + " measures such a component through its port"
         )
     if schedule.is_second_order:
         return line_model(blocks, schedule)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Matrix
 from orchestrator.core.errors import AnalysisError
+from orchestrator.core.options import Option, command
 from orchestrator.devices.fmi.component import Component, RealBatch
 from orchestrator.linear.models.held_inputs import over_held_inputs
 
@@ -272,9 +273,13 @@ class _Comparison:
         share = differs[k, worst] / max(largest[worst], response.floors[columns[worst]])
         raise AnalysisError(
             f"component {self.component.name!r}: {self.what} is not what the FMU does: "
-            f"{self.plan.ends[k] * self.step_size:.4g} s into small steps of {', '.join(self.model.inputs)}, "
-            f"{self.model.signals[columns[worst]]} is {found[k, worst]:.6g} per unit of them, where it should be "
-            f"{said[k, worst]:.6g} ({how}): off by {100 * share:.3g} % of its largest value, and {100 * part:g} % is "
-            "allowed; pack the model of this FMU anew (`gfor fmu build --with-linear-model`), or have the FMU measured "
-            "instead (`gfor modes --black-box`)"
+            f"{self.plan.ends[k] * self.step_size:.4g} s into small steps of "
+            f"{', '.join(self.model.inputs)}, {self.model.signals[columns[worst]]} is "
+            f"{found[k, worst]:.6g} per unit of them, where it should be "
+            f"{said[k, worst]:.6g} ({how}): off by {100 * share:.3g} % of its largest "
+            f"value, and {100 * part:g} % is allowed; pack the model of this FMU anew ("
+            + command("fmu build", Option.WITH_LINEAR_MODEL)
+            + "), or have the FMU measured instead ("
+            + command("modes", Option.BLACK_BOX)
+            + ")"
         )

@@ -5,6 +5,7 @@ for one set of parameters, so both are compared with the running FMU before it i
 
 from orchestrator.core.arrays import Matrix
 from orchestrator.core.errors import AnalysisError, ErrorKind
+from orchestrator.core.options import Option, command
 from orchestrator.devices.fmi.component import Component, RealBatch
 from orchestrator.devices.fmi.converted import ConvertedDescription
 from orchestrator.devices.fmi.linear_model import EmbeddedModel, read_embedded_model
@@ -61,10 +62,14 @@ def _parameters(component: Component, model: EmbeddedModel) -> dict[str, float |
     return starts | model.parameters
 
 
-_MEASURE = (
-    "`gfor modes CASE --black-box` identifies it from its inputs and outputs, and "
-    "`gfor modes CASE --black-box --component {}` shows that in detail"
-)
+def _measure(name: str) -> str:
+    """Return the ways to a linear model of a component that is only measured."""
+    return (
+        command("modes CASE", Option.BLACK_BOX)
+        + " identifies it from its inputs and outputs, and "
+        + command("modes CASE", Option.BLACK_BOX, (Option.COMPONENT, name))
+        + " shows that in detail"
+    )
 
 
 def obstacle(component: Component) -> str | None:
@@ -73,17 +78,20 @@ def obstacle(component: Component) -> str | None:
     if not description.can_save_state:
         return (
             f"component {component.name!r}: its FMU cannot save and restore its state (canGetAndSetFMUstate), "
-            f"so it cannot be perturbed and put back; {_MEASURE.format(component.name)}. (An export for linearisation "
-            "needs both: canGetAndSetFMUstate, and continuous states that a master may set, declared under "
-            "VendorAnnotations as fmus/toolchain/README.md has it)"
+            "so it cannot be perturbed and put back; "
+            + _measure(component.name)
+            + ". (An export for linearisation needs both: canGetAndSetFMUstate, and continuous states "
+            "that a master may set, declared under VendorAnnotations as fmus/toolchain/README.md has it)"
         )
     # An FMU may hide its states. Treated as an FMU without states, it would give wrong modes.
     if not description.states_are_settable and embedded_model(component) is None:
         return (
-            f"component {component.name!r}: its FMU does not let a master set its continuous states, which "
-            "linearisation by perturbation needs, and has no linear model inside; "
-            f"{_MEASURE.format(component.name)}. (An FMU declares settable states under VendorAnnotations, as "
-            "fmus/toolchain/README.md has it; `gfor fmu build --with-linear-model` packs a model of ours)"
+            f"component {component.name!r}: its FMU does not let a master set its "
+            "continuous states, which linearisation by perturbation needs, and has no "
+            "linear model inside; "
+            + _measure(component.name)
+            + ". (An FMU declares settable states under VendorAnnotations, as fmus/toolchain/README.md has "
+            "it; " + command("fmu build", Option.WITH_LINEAR_MODEL) + " packs a model of ours)"
         )
     return None
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from orchestrator.core.arrays import Matrix
 from orchestrator.core.errors import AnalysisError, ErrorKind
+from orchestrator.core.options import Option, command
 from orchestrator.linear.models.coupled_state import CoupledState
 from orchestrator.linear.models.device_start import misfits_of, sentences
 from orchestrator.linear.models.held_states import (
@@ -143,8 +144,9 @@ def _beside_stores(
     changes = f"{_newton_in_words(found.iterations)} a communication step changes {worst}, more than {tolerance:g}"
     if reason:
         raise AnalysisError(
-            f"no steady state found: {reason}, so that it is no store which could be held; `gfor run` simulates it, "
-            "and `gfor modes CASE --black-box` measures its component as it is",
+            f"no steady state found: {reason}, so that it is no store which could be held; `gfor run` simulates it, and "
+            + command("modes CASE", Option.BLACK_BOX)
+            + " measures its component as it is",
             kind=ErrorKind.STEADY_STATE,
         )
     present = described(master.system.wires)
@@ -155,7 +157,7 @@ def _beside_stores(
             kind=ErrorKind.STEADY_STATE,
         )
     raise AnalysisError(
-        f"no steady state found: {changes}; {what_to_check(master)}",
+        f"no steady state found: {changes}; " + what_to_check(master),
         kind=ErrorKind.STEADY_STATE,
     )
 
@@ -178,7 +180,8 @@ def _periodic_point(
         )
         raise AnalysisError(
             f"no steady state found: {_newton_in_words(found.iterations)} a period of {period:g} s, after which "
-            f"sampled controllers repeat, changes {worst}, more than {tolerance:g}; {what_to_check(master)}",
+            f"sampled controllers repeat, changes {worst}, more than {tolerance:g}; "
+            + what_to_check(master),
             kind=ErrorKind.STEADY_STATE,
         )
     values = {
@@ -196,8 +199,10 @@ def what_to_check(master: Master) -> str:
     if master.late_starts:
         late = "; ".join(late.text for late in master.late_starts.values())
         return (
-            f"{late}. Its partners started from the first value: have the FMU compute its outputs in initialisation "
-            "mode (`gfor fmu check --only initial_outputs` shows it alone)"
+            f"{late}. Its partners started from the first value: have the FMU compute its "
+            "outputs in initialisation mode ("
+            + command("fmu check", (Option.ONLY, "initial_outputs"))
+            + " shows it alone)"
         )
     misfits = sentences(misfits_of(master))
     if misfits:

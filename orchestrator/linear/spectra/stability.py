@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.core.errors import few
+from orchestrator.core.options import Option
 from orchestrator.core.truth import NoTruth
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.critical_modes import nearest_pairs
@@ -83,7 +84,7 @@ class Hidden:
         highest = max(z.imag for z in self.electromechanical) / (2 * np.pi)
         wide = f"{min(low, self._lowest_swing):.2g}:{max(high, np.ceil(10 * highest) / 10):g}"
         text += f"; electromechanical: {few(shown, _SWINGS_SHOWN, '; ')}"
-        return f"{text}: show them by --range {wide}" if remedy else text
+        return (f"{text}: show them by " + Option.RANGE + f" {wide}") if remedy else text
 
     def as_json(self) -> dict[str, Any]:
         """The number and the least damped of the hidden modes as JSON's types."""

@@ -114,8 +114,8 @@ def _hash(case: Case) -> str:
 def check_case(study: Mapping[str, Any], case: Case, folder: Path) -> None:
     if study["hash"] != _hash(case):
         raise InputError(
-            f"{folder / CELLS}: {case.path} is not as it was when the study was computed, or is another file; compute "
-            "the study anew, or give the case itself"
+            f"{folder / CELLS}: {case.source} is not as it was when the study was computed, or is another file; "
+            "compute the study anew, or give the case itself"
         )
 
 

@@ -6,6 +6,7 @@ import tempfile
 from pathlib import Path
 
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 
 BROWSERS = (
     "chromium",
@@ -26,7 +27,8 @@ def print_pdf(page: Path, target: Path) -> Path:
     browser = find_browser()
     if browser is None:
         raise InputError(
-            f"--pdf: none of {', '.join(BROWSERS)} is installed; open {page} in a browser and print it to a file"
+            Option.PDF
+            + f": none of {', '.join(BROWSERS)} is installed; open {page} in a browser and print it to a file"
         )
     with tempfile.TemporaryDirectory() as profile:
         command = [
@@ -49,9 +51,9 @@ def print_pdf(page: Path, target: Path) -> Path:
             )
         except (OSError, subprocess.TimeoutExpired) as error:
             raise InputError(
-                f"--pdf: {browser} does not print: {error}; print {page} by hand"
+                Option.PDF + f": {browser} does not print: {error}; print {page} by hand"
             ) from error
     if not target.is_file():
         said = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
-        raise InputError(f"--pdf: {browser} printed nothing ({said}); print {page} by hand")
+        raise InputError(Option.PDF + f": {browser} printed nothing ({said}); print {page} by hand")
     return target

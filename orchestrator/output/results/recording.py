@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.core.errors import InputError, ResultsError
+from orchestrator.core.options import Option
 from orchestrator.core.safe_files import flush, not_written, write_bytes
 from orchestrator.output.results.netcdf import (
     DAMAGED,
@@ -52,9 +53,12 @@ def require_room(scenarios: Sequence[PreparedScenario], folder: Path, *, csv: bo
         f"{folder}: the recordings would take about {_in_words(needed)} there, and {_in_words(free)} are free: "
         f"{len(longest.record)} signals every {interval:g} s until t = {longest.stop_time:g} s"
         + (f", in {len(scenarios)} scenarios" if len(scenarios) > 1 else "")
-        + "; make solver.record_interval longer, name fewer signals in solver.record, end the run earlier (--stop), "
-        + ("leave the table out (--no-csv), " if csv else "")
-        + "or choose another disk (--out)"
+        + (
+            "; make solver.record_interval longer, name fewer signals in solver.record, "
+            "end the run earlier (" + Option.STOP + "), "
+        )
+        + (("leave the table out (" + Option.NO_CSV + "), ") if csv else "")
+        + ("or choose another disk (" + Option.OUT + ")")
     )
 
 

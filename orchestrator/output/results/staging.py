@@ -10,6 +10,7 @@ from secrets import token_hex
 from shutil import copy2, rmtree
 
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.core.safe_files import PARTIAL, flush, inputs, not_written
 from orchestrator.output.results.manifest import (
     MANIFEST,
@@ -78,8 +79,8 @@ def require_results(place: Path) -> None:
         place.is_dir() and any(place.iterdir()) and not (place / MANIFEST).is_file()
     ):
         raise InputError(
-            f"{place}: the results of the scenario {place.name!r} go there, and no run has made what is "
-            "there now; give another --out, or move it"
+            f"{place}: the results of the scenario {place.name!r} go there, and no run "
+            "has made what is there now; give another " + Option.OUT + ", or move it"
         )
 
 
@@ -195,7 +196,7 @@ def check_free(folder: Path, contents: Mapping[str, bytes | None]) -> None:
         if _is_foreign(
             folder, name, None if content is None else hashlib.sha256(content).hexdigest()
         ):
-            raise _foreign(folder / name, "give another --out, or move it")
+            raise _foreign(folder / name, ("give another " + Option.OUT + ", or move it"))
 
 
 def _is_foreign(folder: Path, name: str, content: str | None) -> bool:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import read_bytes, read_text
+from orchestrator.core.options import Option
 from orchestrator.output.signatures import ssh_keygen
 from orchestrator.output.signatures.public_key import PublicKey
 from orchestrator.output.signatures.wire import WireError
@@ -105,10 +106,10 @@ def read_signers(path: Path, revoked: Path | None = None) -> Signers:
     ------
     InputError
         If a file cannot be read, or a line is not as OpenSSH has it."""
-    lines = [_read_line(path, k, words) for k, words in _lines(path, "--signers")]
+    lines = [_read_line(path, k, words) for k, words in _lines(path, Option.SIGNERS)]
     if not lines:
         raise InputError(
-            f"--signers {path}: it names nobody; write a line for each signer, such as "
+            Option.SIGNERS + f" {path}: it names nobody; write a line for each signer, such as "
             "`lab@example.org ssh-ed25519 AAAA…`, with the public key from its owner"
         )
     return Signers(path, lines, None if revoked is None else read_revoked(revoked))
@@ -118,20 +119,24 @@ def read_revoked(path: Path) -> Revoked:
     try:
         head = read_bytes(path)[: len(_KRL)]
     except OSError as error:
-        raise InputError(f"--revoked {path}: it cannot be read: {error.strerror}") from error
+        raise InputError(
+            Option.REVOKED + f" {path}: it cannot be read: {error.strerror}"
+        ) from error
     if head == _KRL:
         if not ssh_keygen.is_installed():
             raise InputError(
-                f"--revoked {path}: it is a list of OpenSSH's own form, which ssh-keygen reads, and that is not "
-                "installed; install OpenSSH, or write the public keys into a text, one a line"
+                Option.REVOKED
+                + f" {path}: it is a list of OpenSSH's own form, which ssh-keygen reads, and "
+                "that is not installed; install OpenSSH, or write the public keys into a "
+                "text, one a line"
             )
         return Revoked(path, of_openssh=True)
     keys, fingerprints = set(), set()
-    for number, words in _lines(path, "--revoked"):
+    for number, words in _lines(path, Option.REVOKED):
         if words[0].startswith("SHA256:"):
             fingerprints.add(words[0])
         else:
-            keys.add(_read_key(f"--revoked {path}, line {number}", words))
+            keys.add(_read_key((Option.REVOKED + f" {path}, line {number}"), words))
     return Revoked(path, frozenset(keys), frozenset(fingerprints))
 
 
@@ -140,7 +145,7 @@ def _lines(path: Path, option: str) -> Iterator[tuple[int, list[str]]]:
         text = read_text(path)
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "it is no text"
-        raise InputError(f"{option} {path}: it cannot be read: {why}") from error
+        raise InputError(option + f" {path}: it cannot be read: {why}") from error
     for number, line in enumerate(text.splitlines(), start=1):
         words = _WORD.findall(line)
         if words and not words[0].startswith("#"):
@@ -148,11 +153,12 @@ def _lines(path: Path, option: str) -> Iterator[tuple[int, list[str]]]:
 
 
 def _read_line(path: Path, number: int, words: list[str]) -> AllowedSigner:
-    place = f"--signers {path}, line {number}"
+    place = Option.SIGNERS + f" {path}, line {number}"
     principals, *rest = words
     if _KINDS.fullmatch(principals):
         raise InputError(
-            f"{place}: it begins with the key's kind, {principals}; write the signer's name before it, such as "
+            place
+            + f": it begins with the key's kind, {principals}; write the signer's name before it, such as "
             "lab@example.org"
         )
     options = ""
@@ -176,7 +182,9 @@ def _read_options(place: str, text: str) -> Iterator[tuple[str, str]]:
         option = _OPTION.match(text, end)
         name = option["name"].lower() if option else ""
         if option is None or name not in known:
-            raise InputError(f"{place}: {text[end:]!r} is no option; there are: {', '.join(known)}")
+            raise InputError(
+                place + f": {text[end:]!r} is no option; there are: {', '.join(known)}"
+            )
         yield name, (option["value"] or "").strip('"')
         end = option.end()
 
@@ -184,13 +192,14 @@ def _read_options(place: str, text: str) -> Iterator[tuple[str, str]]:
 def _read_key(place: str, words: Sequence[str]) -> PublicKey:
     if len(words) < 2 or not _KINDS.fullmatch(words[0]):
         raise InputError(
-            f"{place}: it has no public key; write its kind and its text as in the owner's file .pub, such as "
+            place
+            + ": it has no public key; write its kind and its text as in the owner's file .pub, such as "
             "`ssh-ed25519 AAAA…` (of a PEM key: `ssh-keygen -i -m PKCS8 -f public.pem`)"
         )
     try:
         return PublicKey.of_text(words[0], words[1])
     except WireError as error:
-        raise InputError(f"{place}: {error}") from error
+        raise InputError(place + f": {error}") from error
 
 
 def _read_time(place: str, text: str | None) -> datetime | None:
@@ -203,13 +212,13 @@ def _read_time(place: str, text: str | None) -> datetime | None:
         return time.replace(tzinfo=UTC) if text.endswith("Z") else time.astimezone()
     except (KeyError, ValueError, OverflowError) as error:
         raise InputError(
-            f"{place}: {text!r} is no time; write YYYYMMDD or YYYYMMDDHHMM[SS], with Z for UTC"
+            place + f": {text!r} is no time; write YYYYMMDD or YYYYMMDDHHMM[SS], with Z for UTC"
         ) from error
 
 
 def read_time(text: str) -> datetime:
     """Read the value of ``--at``."""
-    time = _read_time("--at", text)
+    time = _read_time(Option.AT, text)
     assert time is not None
     return time
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import read_bytes
+from orchestrator.core.options import Option
 from orchestrator.output.signatures import ssh_keygen
 from orchestrator.output.signatures.dsse import EnvelopeSignature
 from orchestrator.output.signatures.public_key import (
@@ -76,14 +77,17 @@ def _content(key: Path) -> bytes:
         content = read_bytes(key, _MOST).lstrip()
     except OSError as error:
         raise InputError(
-            f"--sign {key}: the key cannot be read: {error.strerror}; a key that is lost cannot be had again: make a "
-            "new one (`ssh-keygen -t ed25519`), and have its public half entered where signers are known"
+            Option.SIGN
+            + f" {key}: the key cannot be read: {error.strerror}; a key that is lost cannot "
+            "be had again: make a new one (`ssh-keygen -t ed25519`), and have its public "
+            "half entered where signers are known"
         ) from error
     begins = (_OPENSSH, *_PUBLIC, b"-----BEGIN ")
     if not content.startswith(begins) or b"PUBLIC KEY-----" in content or b"BEGIN CERT" in content:
         raise InputError(
-            f"--sign {key}: it holds no private key of OpenSSH or PEM; give the file without .pub, or the public key "
-            "of one that the agent has"
+            Option.SIGN
+            + f" {key}: it holds no private key of OpenSSH or PEM; give the file without "
+            ".pub, or the public key of one that the agent has"
         )
     return content
 
@@ -94,8 +98,9 @@ def _signed_as_ssh(key: Path, content: bytes, message: bytes, namespace: str) ->
         return Made(read_content(made).key, made)
     if not content.startswith(_OPENSSH):
         raise InputError(
-            f"--sign {key}: it is a public key, whose private half the agent has; ssh-keygen asks the agent, and is "
-            "not installed"
+            Option.SIGN
+            + f" {key}: it is a public key, whose private half the agent has; ssh-keygen "
+            "asks the agent, and is not installed"
         )
     require_cryptography("signing without ssh-keygen")
     from cryptography.hazmat.primitives.serialization import (  # noqa: PLC0415
@@ -106,7 +111,7 @@ def _signed_as_ssh(key: Path, content: bytes, message: bytes, namespace: str) ->
     try:
         return Made(public_key_of(private), sign_with(private, message, namespace))
     except WireError as error:
-        raise InputError(f"--sign {key}: {error}") from error
+        raise InputError(Option.SIGN + f" {key}: {error}") from error
 
 
 def _loaded(key: Path, content: bytes, load: Any) -> Any:
@@ -116,14 +121,18 @@ def _loaded(key: Path, content: bytes, load: Any) -> Any:
     except TypeError as error:
         if not sys.stdin.isatty():
             raise InputError(
-                f"--sign {key}: it has a passphrase, and there is no terminal to ask for it; give a key of an agent"
+                Option.SIGN
+                + f" {key}: it has a passphrase, and there is no terminal to ask for it; give a "
+                "key of an agent"
             ) from error
     except Exception as error:
-        raise InputError(f"--sign {key}: it cannot be read as a private key: {error}") from error
+        raise InputError(
+            Option.SIGN + f" {key}: it cannot be read as a private key: {error}"
+        ) from error
     try:
         return load(content, getpass(f"Passphrase of {key}: ").encode())
     except Exception as error:
-        raise InputError(f"--sign {key}: it cannot be opened: {error}") from error
+        raise InputError(Option.SIGN + f" {key}: it cannot be opened: {error}") from error
 
 
 def _sign_plain(key: Any, message: bytes) -> bytes:
@@ -138,5 +147,6 @@ def _sign_plain(key: Any, message: bytes) -> bytes:
         salt = padding.PSS(padding.MGF1(hashes.SHA256()), padding.PSS.DIGEST_LENGTH)
         return key.sign(message, salt, hashes.SHA256())
     raise InputError(
-        f"--sign: a key of the kind {type(key).__name__} signs no certificate; give Ed25519, ECDSA or RSA"
+        Option.SIGN + f": a key of the kind {type(key).__name__} signs no certificate; give "
+        "Ed25519, ECDSA or RSA"
     )

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.core.errors import ComponentError, InputError
+from orchestrator.core.options import Option
 from orchestrator.devices.fmi.component import Component, Derived, RealBatch
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.simulation.federation.layout import Part
@@ -276,7 +277,8 @@ def obstacle_of(component: Component) -> str | None:
         return f"component {component.name!r} is a foreign federate, which is no FMU that could be perturbed"
     if not component.description.can_serialize_state:
         return (
-            f"component {component.name!r}: its FMU cannot serialise its state (canSerializeFMUstate), so its federate "
-            "could not be brought to the operating point; compute the modes without --engine helics"
+            f"component {component.name!r}: its FMU cannot serialise its state "
+            "(canSerializeFMUstate), so its federate could not be brought to the "
+            "operating point; compute the modes without " + Option.ENGINE_HELICS
         )
     return None

@@ -21,6 +21,7 @@ from fmus.toolchain.extras import require
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.closing import Closing
 from orchestrator.core.errors import ComponentError, InputError
+from orchestrator.core.options import Option
 from orchestrator.devices.fmi.component import Component
 from orchestrator.devices.fmi.confined import fault_of_exit, last_line
 from orchestrator.devices.fmi.description import FmuDescription
@@ -75,7 +76,7 @@ class Federation(Closing):
         self._opened: list[FederatedComponent] = []
 
     def __enter__(self) -> Self:
-        require("--engine helics", "helics")
+        require(Option.ENGINE_HELICS, "helics")
         self._folder = temporary.own_folder("federation")
         try:
             self._start()

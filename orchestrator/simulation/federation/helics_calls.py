@@ -8,6 +8,7 @@ from types import ModuleType
 from typing import Any
 
 from fmus.toolchain.extras import require
+from orchestrator.core.options import Option
 from orchestrator.simulation.federation.choice import address_of
 
 # HELICS's own default, and the only core of its packages that always works between machines
@@ -22,7 +23,7 @@ OURS_MARK = "gfor-cosim"
 @cache
 def library() -> ModuleType:
     """The package; it takes half a second to import, so only the processes of a federation do."""
-    require("--engine helics", "helics")
+    require(Option.ENGINE_HELICS, "helics")
     import helics  # noqa: PLC0415 - of the extra `federation`, and slow to import
 
     module: ModuleType = helics

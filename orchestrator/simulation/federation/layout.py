@@ -8,6 +8,7 @@ from itertools import pairwise
 
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.simulation.federation.choice import address_of
 
 
@@ -46,17 +47,18 @@ def make_layout(
     prepared: PreparedScenario, names: Sequence[str], external: Sequence[str]
 ) -> Layout:
     system, known = prepared.system, prepared.system.components
-    for option, given in (("--federate", names), ("--external", external)):
+    for option, given in ((Option.FEDERATE, names), (Option.EXTERNAL, external)):
         wrong = [name for name in given if name not in known]
         if wrong:
             raise InputError(
-                f"{option} {wrong[0]}: scenario {prepared.name!r} has no component {wrong[0]!r}; "
+                option + f" {wrong[0]}: scenario {prepared.name!r} has no component {wrong[0]!r}; "
                 f"components: {', '.join(known)}"
             )
     if not prepared.schedule.is_plain:
         raise InputError(
-            "--engine helics needs a schedule with held inputs and a plain clock, gauss-seidel or jacobi; "
-            "leave --like and --tolerance out"
+            Option.ENGINE_HELICS
+            + " needs a schedule with held inputs and a plain clock, gauss-seidel or "
+            "jacobi; leave " + Option.LIKE + " and " + Option.TOLERANCE + " out"
         )
     period = round(prepared.step_size * 1e9)
     wanted = {*names, *external}
@@ -64,8 +66,9 @@ def make_layout(
     groups = [group for group in groups if group]
     if abs(prepared.step_size * 1e9 - period) > 1e-6 or period < 2 * len(groups):
         raise InputError(
-            f"communication step {prepared.step_size:g} s: HELICS counts time in whole nanoseconds, and each group "
-            "with federates needs two of them in a step; give another step with --step"
+            f"communication step {prepared.step_size:g} s: HELICS counts time in whole "
+            "nanoseconds, and each group with federates needs two of them in a step; "
+            "give another step with " + Option.STEP
         )
     edges = [period * i // len(groups) for i in range(len(groups) + 1)]
     slots = tuple(Slot(a, (a + b) // 2, b) for a, b in pairwise(edges))
@@ -110,8 +113,10 @@ def broker_port(wanted: int | None) -> int:
         taken = _take_port(wanted, "")
         if taken is not None:
             raise InputError(
-                f"--broker-port {wanted}: port {taken} is in use (a broker takes two ports, {wanted} and {wanted + 1})"
-                "; give another port, or use the broker that runs there with --broker"
+                Option.BROKER_PORT
+                + f" {wanted}: port {taken} is in use (a broker takes two ports, {wanted} and "
+                f"{wanted + 1}); give another port, or use the broker that runs there with "
+                + Option.BROKER
             )
         return wanted
     for _ in range(_TRIES):
@@ -120,7 +125,8 @@ def broker_port(wanted: int | None) -> int:
         if port < 65000 and _take_port(port, "127.0.0.1") is None:
             return port
     raise InputError(
-        "this machine has no two free ports one after the other for a broker; give one with --broker-port"
+        "this machine has no two free ports one after the other for a broker; give "
+        "one with " + Option.BROKER_PORT
     )
 
 
@@ -140,6 +146,7 @@ def require_broker(broker: str) -> None:
         socket.create_connection((host, port), timeout=_TO_CONNECT).close()
     except OSError as error:
         raise InputError(
-            f"--broker {broker}: nothing answers there ({error}); start one with `helics_broker -f N --ipv4 "
+            Option.BROKER
+            + f" {broker}: nothing answers there ({error}); start one with `helics_broker -f N --ipv4 "
             f"--port={port}`, N being the number of federates and one more for gfor, and look at the firewall"
         ) from error

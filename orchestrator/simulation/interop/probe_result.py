@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from orchestrator.cases.scenario.catalogue_fmus import catalogue_fmu
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import read_text
+from orchestrator.core.options import Option
 from orchestrator.systems.coupling.clock import Clock
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.recorder import Recorder
@@ -172,15 +173,17 @@ def _columns(path: Path, heads: list[str], named: dict[str, str]) -> dict[str, i
         )
         if len(fitting) > 1:
             raise InputError(
-                f"{path}: {signal} may be any of {', '.join(fitting)}; say which with --column {signal}=…"
+                f"{path}: {signal} may be any of {', '.join(fitting)}; say which with "
+                + Option.COLUMN
+                + f" {signal}=…"
             )
         if fitting:
             found[signal] = heads.index(fitting[0])
     if "time" not in found or not any(signal in found for signal in _NEEDED):
         missing = "time" if "time" not in found else " and ".join(_NEEDED)
         raise InputError(
-            f"{path}: no column is seen to be {missing}; columns: {', '.join(heads)}; "
-            f"say which with --column {missing.split(' ')[0]}=…"
+            f"{path}: no column is seen to be {missing}; columns: {', '.join(heads)}; say "
+            "which with " + Option.COLUMN + f" {missing.split(' ')[0]}=…"
         )
     return found
 

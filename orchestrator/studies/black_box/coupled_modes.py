@@ -258,7 +258,7 @@ def _check_still(master: Master, boxes: Sequence[str]) -> float:
     if not moves[worst] <= STILL:
         raise AnalysisError(
             f"no steady state: from the power flow's start, a communication step changes a state of component "
-            f"{worst!r} by {moves[worst]:.3g}, where {STILL:g} is allowed; {what_to_check(master)}"
+            f"{worst!r} by {moves[worst]:.3g}, where {STILL:g} is allowed; " + what_to_check(master)
         )
     return moves[worst]
 

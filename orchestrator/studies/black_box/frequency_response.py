@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.core.errors import AnalysisError
+from orchestrator.core.options import Option, command
 from orchestrator.studies.black_box.bench import Bench, Runs
 
 _CHUNK = 4096
@@ -197,10 +198,13 @@ def _by_multisine(
         _check_returned(bench, column, np.abs(mean).max(), np.abs(y - mean).max())
         return found[-1], change * len(found) / apart, len(found) * seconds
     raise AnalysisError(
-        f"{bench.description.path.name}: after {len(found) * seconds:g} s of a periodic {bench.inputs[column]} its "
-        f"response still changes by {change.max() / np.abs(found[-1]).max():.2g} over {apart * seconds:g} s; it is "
-        "unstable at an ideal bus, or slower than that, or follows what it stores, such as a battery's charge: "
-        "try `gfor fmu admittance --method pulse`, or a smaller amplitude"
+        f"{bench.description.path.name}: after {len(found) * seconds:g} s of a "
+        f"periodic {bench.inputs[column]} its response still changes by "
+        f"{change.max() / np.abs(found[-1]).max():.2g} over {apart * seconds:g} s; it "
+        "is unstable at an ideal bus, or slower than that, or follows what it "
+        "stores, such as a battery's charge: try "
+        + command("fmu admittance", (Option.METHOD, "pulse"))
+        + ", or a smaller amplitude"
     )
 
 

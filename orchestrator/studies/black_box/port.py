@@ -8,6 +8,7 @@ import numpy as np
 
 from orchestrator.cases.form.values import check_system_base, convert
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.devices import NO_BUS, is_controller_alone
 from orchestrator.studies.black_box.bench import Bench
@@ -19,13 +20,15 @@ def values_for(description: FmuDescription, given: Mapping[str, Any]) -> dict[st
         info = description.variables.get(name)
         if info is None:
             raise InputError(
-                f"--set {name}: {description.path.name} has no such variable; `gfor fmu info` lists them"
+                Option.SET
+                + f" {name}: {description.path.name} has no such variable; `gfor fmu info` "
+                "lists them"
             )
         try:
             values[name] = convert(info, value)
             check_system_base(description, name, values[name])
         except ValueError as error:
-            raise InputError(f"--set {name}: {error}") from error
+            raise InputError(Option.SET + f" {name}: {error}") from error
     return values
 
 
@@ -49,7 +52,8 @@ def bench_at(
         raise InputError(f"{description.path.name}: it has no {', '.join(missing)}: {NO_BUS}")
     if missing:
         raise InputError(
-            f"{description.path.name}: it has no {', '.join(missing)}; an admittance is measured at our port, to which "
-            "a vendor.toml maps another FMU's variables; give it with --binding"
+            f"{description.path.name}: it has no {', '.join(missing)}; an admittance is "
+            "measured at our port, to which a vendor.toml maps another FMU's variables; "
+            "give it with " + Option.BINDING
         )
     return bench

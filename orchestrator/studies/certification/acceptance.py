@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option, command
 from orchestrator.core.safe_files import file_hash, write_text
 
 KEPT = "check.json"  # name of the report's file in a certificate's folder
@@ -46,7 +47,13 @@ def run_checks(fmu: Path, binding: Path | None, folder: Path) -> Acceptance:
 
 
 def read_checks(path: Path, fmu: Path, binding: Path | None) -> Acceptance:
-    remedy = "write it with `gfor fmu check FILE.fmu --json`, or leave --check away to have the tests run"
+    remedy = (
+        "write it with "
+        + command("fmu check FILE.fmu", Option.JSON)
+        + ", or leave "
+        + Option.CHECK
+        + " away to have the tests run"
+    )
     try:
         report = json.loads(path.read_text(encoding="utf-8"))
         hashes = report["sha256"]["fmu"], report["sha256"]["binding"]
@@ -62,28 +69,39 @@ def read_checks(path: Path, fmu: Path, binding: Path | None) -> Acceptance:
         tool = report["tool"]
     except OSError as error:
         raise InputError(
-            f"--check {path}: it cannot be read: {error.strerror}; {remedy}"
+            Option.CHECK + f" {path}: it cannot be read: {error.strerror}; {remedy}"
         ) from error
     except (ValueError, KeyError, TypeError) as error:
         raise InputError(
-            f"--check {path}: it is no report of `gfor fmu check --json`; {remedy}"
+            Option.CHECK
+            + f" {path}: it is no report of "
+            + command("fmu check", Option.JSON)
+            + f"; {remedy}"
         ) from error
     if hashes != (file_hash(fmu), file_hash(binding)):
-        raise InputError(f"--check {path}: it is of another FMU or binding than {fmu}; {remedy}")
+        raise InputError(
+            Option.CHECK + f" {path}: it is of another FMU or binding than {fmu}; {remedy}"
+        )
     if tool != _tool():
-        raise InputError(f"--check {path}: it was made by {tool}, this is {_tool()}; {remedy}")
+        raise InputError(
+            Option.CHECK + f" {path}: it was made by {tool}, this is {_tool()}; {remedy}"
+        )
     faults = tuple(dict.fromkeys(fault for verdict, fault, _ in found if verdict == "fail"))
     if said != (not faults and not reasons):
-        raise InputError(f"--check {path}: its checks say otherwise than its 'trusted'; {remedy}")
+        raise InputError(
+            Option.CHECK + f" {path}: its checks say otherwise than its 'trusted'; {remedy}"
+        )
     from orchestrator.devices.acceptance.checks.all import CHECKS  # noqa: PLC0415 - as above
 
     there = {name for *_, name in found}
     left = [name for name in CHECKS if name not in there]
     if not faults and left:
-        raise InputError(f"--check {path}: it does not hold {', '.join(left)}; {remedy}")
+        raise InputError(Option.CHECK + f" {path}: it does not hold {', '.join(left)}; {remedy}")
     if not faults and not any(verdict == "pass" for verdict, *_ in found):
         raise InputError(
-            f"--check {path}: none of its checks was passed, so that it says nothing of the FMU; {remedy}"
+            Option.CHECK
+            + f" {path}: none of its checks was passed, so that it says nothing of the FMU; "
+            f"{remedy}"
         )
     return Acceptance(not faults and not reasons, faults or _unknown(reasons), report)
 

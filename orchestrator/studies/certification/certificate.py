@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 
 from orchestrator.cases.form.schema import Value
 from orchestrator.core.errors import CaseError, Problem
+from orchestrator.core.options import Option
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.values import as_text
 from orchestrator.studies.certification.acceptance import Acceptance
@@ -253,7 +254,7 @@ def _refused(request: CertificationRequest, error: CaseError, trial: str, where:
         place = re.sub(r"^line \d+, ", "", problem.place)
         value = _OWN.match(place)
         if value and value["name"] in request.values:
-            place = f"--set {value['name']}={_value_text(request.values[value['name']])}"
+            place = Option.SET + f" {value['name']}={_value_text(request.values[value['name']])}"
         text = said(problem.text).replace(f"component {CONVERTER!r} has", "the FMU has")
         problems.append(Problem(place, text))
     if request.binding is None and any(
@@ -262,7 +263,9 @@ def _refused(request: CertificationRequest, error: CaseError, trial: str, where:
         problems.append(
             Problem(
                 "",
-                f"if its port has other names, give --binding; `gfor fmu bind {request.fmu}` drafts one",
+                "if its port has other names, give "
+                + Option.BINDING
+                + f"; `gfor fmu bind {request.fmu}` drafts one",
             )
         )
     return CaseError(f"{request.fmu}, {where}", tuple(dict.fromkeys(problems)))

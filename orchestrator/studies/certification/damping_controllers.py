@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from orchestrator.cases.form.schema import Value
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.devices.fmi.description import FmuDescription, VariableInfo
 from orchestrator.devices.fmi.port import BoundDescription
 from orchestrator.devices.fmi.values import as_text
@@ -115,12 +116,13 @@ def _refuse_contradiction(
     description: FmuDescription, request: CertificationRequest, name: str, on: bool
 ) -> None:
     said = {
-        "--set": request.values.get(name),
+        Option.SET: request.values.get(name),
         f"the binding {request.binding}": _bound(description, name),
     }
     for source, value in said.items():
         if value is not None and value is not on:
             raise InputError(
-                f"--pod {request.pod} needs {name} = {as_text(on)}, but {source} has {name} = "
+                Option.POD
+                + f" {request.pod} needs {name} = {as_text(on)}, but {source} has {name} = "
                 f"{as_text(value)}; leave one of them away, or make them agree"
             )

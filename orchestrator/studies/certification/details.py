@@ -8,6 +8,7 @@ from pydantic import ConfigDict, ValidationError
 
 from orchestrator.cases.form.locate import line_of
 from orchestrator.core.errors import CaseError, Problem
+from orchestrator.core.options import Option
 from orchestrator.core.toml_files import Table, read_toml
 
 TEMPLATE = Path(__file__).with_name("details_template.toml").read_text(encoding="utf-8")
@@ -49,7 +50,9 @@ def details_of(texts: Mapping[str, str]) -> Details:
 
 
 def read_details(path: Path) -> Details:
-    text, raw = read_toml(path, "it", "`gfor certify --details-template` prints one", "--details")
+    text, raw = read_toml(
+        path, "it", "`gfor certify --details-template` prints one", Option.DETAILS
+    )
     try:
         return Details.model_validate(raw)
     except ValidationError as error:
@@ -57,7 +60,7 @@ def read_details(path: Path) -> Details:
             _problem(text, detail["loc"][0], detail["type"], detail.get("input"))
             for detail in error.errors()
         ]
-        raise CaseError(f"--details {path}", problems) from error
+        raise CaseError(Option.DETAILS + f" {path}", problems) from error
 
 
 def _problem(text: str, key: int | str, kind: str, seen: object) -> Problem:

@@ -11,6 +11,7 @@ import xarray as xr
 
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import read_text
+from orchestrator.core.options import Option
 from orchestrator.core.safe_files import file_hash, write_text
 from orchestrator.output.report.pdf import print_pdf
 from orchestrator.output.results.staging import check_free
@@ -85,8 +86,8 @@ def spare_another(folder: Path, code: str, fmu: Path, binding: Path | None) -> N
         return
     if there != code:
         raise InputError(
-            f"{folder}: it holds a certificate by {there}, which one by {code} would replace; give "
-            "another --out, or leave it out"
+            f"{folder}: it holds a certificate by {there}, which one by {code} would "
+            "replace; give another " + Option.OUT + ", or leave it out"
         )
 
 

@@ -21,6 +21,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import CosimError, FmuFileError, InputError, few
+from orchestrator.core.options import Option, command
 from orchestrator.core.safe_files import write_bytes
 from orchestrator.devices.fmi.archive import DAMAGE, extract, names_in
 from orchestrator.devices.fmi.bound import BoundComponent
@@ -104,9 +105,10 @@ def _files(row: str, prepared: PreparedScenario) -> dict[str, bytes]:
     if not np.all(np.abs(replay.coupled - tested) <= _REPEATED * size):
         worst = float(np.max(np.abs(replay.coupled - tested) / size))
         raise CosimError(
-            f"--into: row {row}: with the same inputs the FMU alone answers otherwise than in the test, "
-            f"by {worst:.2g} of an output's size, so that nobody could repeat it; look at `gfor fmu "
-            "check`"
+            Option.INTO
+            + f": row {row}: with the same inputs the FMU alone answers otherwise than in "
+            f"the test, by {worst:.2g} of an output's size, so that nobody could repeat "
+            "it; look at `gfor fmu check`"
         )
     description = _own(master.components[CONVERTER]).description
     names = {
@@ -240,8 +242,9 @@ def taken_out(fmu: Path, into: Path) -> list[Path]:
     folders = sorted(place for place in (into / FOLDER).glob("*") if place.is_dir())
     if tested is None or not folders:
         raise InputError(
-            f"{fmu}: there is no certificate in it; `gfor certify --into` writes one, and a certificate "
-            "beside an FMU is verified by its folder"
+            f"{fmu}: there is no certificate in it; "
+            + command("certify", Option.INTO)
+            + " writes one, and a certificate beside an FMU is verified by its folder"
         )
     for folder in folders:
         write_bytes(folder / FMU, tested)
@@ -287,13 +290,15 @@ def _check_names(fmu: Path) -> None:
     taken = [name for name in names if name.startswith(f"{FOLDER}/")]
     if taken:
         raise InputError(
-            f"--into: {fmu} holds {taken[0]}; certify the FMU without certificates, and name this file "
-            "as --into: the new certificate joins those in it"
+            Option.INTO
+            + f": {fmu} holds {taken[0]}; certify the FMU without certificates, and name "
+            "this file as " + Option.INTO + ": the new certificate joins those in it"
         )
     if _MANIFEST in names:
         raise InputError(
-            f"--into: {fmu} has a manifest of LS-REF already ({_MANIFEST}), which a certificate cannot "
-            "join; build it without reference results, or take them away"
+            Option.INTO
+            + f": {fmu} has a manifest of LS-REF already ({_MANIFEST}), which a certificate "
+            "cannot join; build it without reference results, or take them away"
         )
 
 
@@ -305,12 +310,13 @@ def _others(target: Path, tested: bytes) -> dict[str, bytes]:
             same = _unpacked(target, place) == tested
         except FmuFileError as error:
             raise InputError(
-                f"--into: {target} exists and is no FMU: {error}; name another file"
+                Option.INTO + f": {target} exists and is no FMU: {error}; name another file"
             ) from error
         if not same:
             raise InputError(
-                f"--into: {target} exists and is not the FMU that was tested, with certificates; name "
-                "another file"
+                Option.INTO
+                + f": {target} exists and is not the FMU that was tested, with certificates; "
+                "name another file"
             )
         files = {
             file.relative_to(place).as_posix(): file for file in sorted((place / FOLDER).rglob("*"))

@@ -12,7 +12,8 @@ from orchestrator.cases.form.given import binding_path, plain
 from orchestrator.cases.form.schema import Value
 from orchestrator.core.asked import FILE, FLAG, FieldKind, asked, number_in, one_of, path
 from orchestrator.core.errors import InputError
-from orchestrator.core.spelling import for_python
+from orchestrator.core.options import Option
+from orchestrator.core.spelling import Spelling
 from orchestrator.devices.fmi.devices import as_device
 from orchestrator.studies.certification import points_again
 from orchestrator.studies.certification.acceptance import KEPT, Acceptance
@@ -46,7 +47,8 @@ class Parts:
 
     one: str  # what a part is called; the record has a list of them
     task: type[Task]
-    option: str  # with which `gfor verify` takes some of them
+    option: Spelling  # with which `gfor verify` takes some of them, and in Python the function
+    values: str  # of that option
     # the module that judges them again: ``rebuilt``, ``faults``, ``choose``, ``tasks`` and ``compare``
     again: Any
     compute: Callable[[Any], Any]
@@ -60,11 +62,12 @@ class Parts:
         named = any(isinstance(one, str) for one in wanted)
         if wanted and named != (self is ROWS):
             kind = "a grid code" if self is ROWS else "a damping test"
-            given, rule = ("--rows" if named else "--points"), self.option
-            if for_python():
-                given, rule = "anew", self.option.partition(", with ")[2]
+            given = ROWS if named else POINTS
             raise InputError(
-                f"{given}: {folder} is the certificate of {kind}, which has {self.one}s; give {rule}"
+                given.option
+                + f": {folder} is the certificate of {kind}, which has {self.one}s; give "
+                + self.option
+                + f", with {self.values}"
             )
         return list(self.again.choose(content, wanted, every=every))
 
@@ -86,10 +89,21 @@ class Parts:
 
 
 POINTS = Parts(
-    "point", CertificatePointTask, "--points, with line reactances", points_again, compute_point
+    "point",
+    CertificatePointTask,
+    Spelling("--points", "anew"),
+    values="line reactances",
+    again=points_again,
+    compute=compute_point,
 )
 ROWS = Parts(
-    "row", BenchTask, "--rows, with their names", rows_again, compute_row, rows_again.later
+    "row",
+    BenchTask,
+    Spelling("--rows", "anew"),
+    values="their names",
+    again=rows_again,
+    compute=compute_row,
+    later=rows_again.later,
 )
 
 
@@ -233,8 +247,9 @@ class CertifyRequest:
             )
         if self.declared:
             raise InputError(
-                f"--declare {next(iter(self.declared))}: the damping test takes no declared value; leave "
-                f"it out, or choose --code {', '.join(codes_by_declaration())}"
+                Option.DECLARE
+                + f" {next(iter(self.declared))}: the damping test takes no declared value; "
+                "leave it out, or choose " + Option.CODE + f" {', '.join(codes_by_declaration())}"
             )
         study = {name: value for name, value in values.items() if name.split(".")[0] in STUDY}
         own = {name: value for name, value in values.items() if name not in study}

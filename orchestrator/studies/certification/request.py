@@ -8,6 +8,7 @@ from pathlib import Path
 from orchestrator.cases.form.schema import Value
 from orchestrator.core.asked import as_number
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.devices.fmi.port import BoundDescription
 from orchestrator.devices.fmi.values import as_text
@@ -39,8 +40,9 @@ class CertificationRequest:
         for file in (self.fmu, *([self.binding] if self.binding else [])):
             if not file.is_file():
                 raise InputError(
-                    f"{file}: there is no such file; give the path of an .fmu, and with --binding of a "
-                    ".toml"
+                    f"{file}: there is no such file; give the path of an .fmu, and with "
+                    + Option.BINDING
+                    + " of a .toml"
                 )
             if not file.name.isascii() and file.name != file.name.encode(errors="replace").decode():
                 raise InputError(
@@ -48,7 +50,9 @@ class CertificationRequest:
                 )
         if "grid.X_L" in self.study_values:
             raise InputError(
-                "--set grid.X_L: the test varies it; choose its values with --reactances"
+                Option.SET
+                + " grid.X_L: the test varies it; choose its values with "
+                + Option.REACTANCES
             )
 
     @property

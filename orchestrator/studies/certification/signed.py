@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.output.signatures.allowed_signers import Signers, read_signers, read_time
 from orchestrator.output.signatures.beside import NAMESPACE, Beside
 from orchestrator.output.signatures.checking import (
@@ -55,7 +56,12 @@ class Asked:
         if signers is None:
             if revoked is not None or at is not None:
                 raise InputError(
-                    "--revoked, --at: they say more of the signers of --signers; give that file as well"
+                    Option.REVOKED
+                    + ", "
+                    + Option.AT
+                    + ": they say more of the signers of "
+                    + Option.SIGNERS
+                    + "; give that file as well"
                 )
             return cls()
         listed = read_signers(signers, revoked)
@@ -64,7 +70,8 @@ class Asked:
         time = read_time(at) if isinstance(at, str) else at
         if not _YEARS[0] <= time.year <= _YEARS[1]:
             raise InputError(
-                f"--at {time:%Y-%m-%d}: no certificate is of that time; give a year from {_YEARS[0]} to {_YEARS[1]}"
+                Option.AT + f" {time:%Y-%m-%d}: no certificate is of that time; give a year from "
+                f"{_YEARS[0]} to {_YEARS[1]}"
             )
         return cls(listed, time.astimezone(UTC))
 

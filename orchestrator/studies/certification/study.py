@@ -6,6 +6,7 @@ from pathlib import Path
 from orchestrator.cases.form.schema import Value
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.studies.certification.case_file import BASE, WITH, WITHOUT, write_case
 from orchestrator.studies.certification.certificate import Certificate, DampingCertificate, refusing
@@ -39,7 +40,9 @@ def certify(
     own = rated_frequency(request, NTS.f_n)
     if own != NTS.f_n:
         others = (
-            ", ".join(f"--code {key}" for key, code in tables().items() if code.f_n == own)
+            ", ".join(
+                (Option.CODE + f" {key}") for key, code in tables().items() if code.f_n == own
+            )
             or "none"
         )
         raise InputError(

@@ -24,6 +24,7 @@ from orchestrator.core.asked import (
     asked,
 )
 from orchestrator.core.errors import AnalysisError, InputError
+from orchestrator.core.options import Option
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.studies.coordinated_design.following import with_followed_names
 from orchestrator.studies.coordinated_design.objective import Aim, RatedPoint, worth_of_all
@@ -161,7 +162,8 @@ def plan_points_design(case: Case, request: PointsDesignRequest) -> PointsDesign
     for name in request.modes:
         if name not in known:
             raise InputError(
-                f"--mode: the case names no mode {name!r}; it names: {', '.join([*known, ALL])}"
+                Option.MODE
+                + f": the case names no mode {name!r}; it names: {', '.join([*known, ALL])}"
             )
     scenario = _scenario(case, request)
     candidates = _candidates(case, request, scenario, groups)
@@ -180,7 +182,7 @@ def plan_points_design(case: Case, request: PointsDesignRequest) -> PointsDesign
     plans = read.prepared.system.components
     for group in groups:
         for bound in request.gain_bounds:
-            check_range(plans, group.components, f"{group.controller}.K", bound, "--gain-bounds")
+            check_range(plans, group.components, f"{group.controller}.K", bound, Option.GAIN_BOUNDS)
     for place in candidates:
         check_tunable(place.component, plans[place.component].description, place.controller)
     clash = {key for item in read.items for key in item.values} & {
@@ -233,7 +235,8 @@ def _groups(case: Case, request: PointsDesignRequest) -> tuple[PodGroup, ...]:
             shared = set(other.places) & set(group.places)
             if shared:
                 raise InputError(
-                    f"--component: {min(shared).component} is in two of the patterns; a converter gets one "
+                    Option.COMPONENT
+                    + f": {min(shared).component} is in two of the patterns; a converter gets one "
                     "setting: let each pattern have converters of its own"
                 )
         found.append(group)

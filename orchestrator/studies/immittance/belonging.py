@@ -6,6 +6,7 @@ import numpy as np
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.studies.immittance.cut import Cut
 from orchestrator.studies.immittance.judgement import CutJudgement, NyquistVerdict
 from orchestrator.studies.immittance.loop import CutLoop
@@ -34,8 +35,12 @@ def check_size(loop: CutLoop, low: float, high: float) -> None:
     if not _UNLIKE[0] < ratio < _UNLIKE[1]:
         raise InputError(
             f"{loop.device.name} times the impedance of {loop.network.name} is {ratio:.2g} at most frequencies: is one "
-            "of them in per unit where the other is in siemens? Then give --per-unit device or network, and --voltage; "
-            "if the units are right, give --units-checked"
+            "of them in per unit where the other is in siemens? Then give "
+            + Option.PER_UNIT
+            + " device or network, and "
+            + Option.VOLTAGE
+            + "; if the units are right, give "
+            + Option.UNITS_CHECKED
         )
 
 

@@ -11,6 +11,7 @@ from orchestrator.cases.scenario.facts import rated_frequency
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Complex, Matrix
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.linear.models.device_start import misfits_of, sentences
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.linearization import Blocks, continuous
@@ -97,14 +98,16 @@ def buses_of(master: Master) -> dict[str, str]:
 def _devices(homes: dict[str, str], bus: str | None, names: tuple[str, ...]) -> tuple[str, ...]:
     if not homes:
         raise InputError(
-            "the case has no device that takes a voltage (v_re, v_im) and gives a current (i_re, i_im); phasor models "
-            "have another port: cut its EMT models, such as by --set models=emt"
+            "the case has no device that takes a voltage (v_re, v_im) and gives a "
+            "current (i_re, i_im); phasor models have another port: cut its EMT models, "
+            "such as by " + Option.SET + " models=emt"
         )
     unknown = [name for name in names if name not in homes]
     if unknown:
         raise InputError(
-            f"--component {unknown[0]}: it is no device with a voltage and a current in this scenario (--scenario "
-            f"chooses another); there are: {', '.join(homes)}"
+            Option.COMPONENT
+            + f" {unknown[0]}: it is no device with a voltage and a current in this "
+            "scenario (" + Option.SCENARIO + f" chooses another); there are: {', '.join(homes)}"
         )
     if bus is None:
         return names or tuple(homes)
@@ -112,7 +115,8 @@ def _devices(homes: dict[str, str], bus: str | None, names: tuple[str, ...]) -> 
     for one in wanted:
         if not any(one in (home, home.rpartition(".")[2]) for home in homes.values()):
             raise InputError(
-                f"--bus {one}: no device stands there; devices stand at {', '.join(sorted(set(homes.values())))}"
+                Option.BUS + f" {one}: no device stands there; devices stand at "
+                f"{', '.join(sorted(set(homes.values())))}"
             )
     found = tuple(
         name for name, home in homes.items() if {home, home.rpartition(".")[2]} & set(wanted)

@@ -9,6 +9,7 @@ from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.form.schema import ComponentTable
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.studies.immittance.belonging import check_place
 from orchestrator.studies.immittance.cut import Cut
 from orchestrator.studies.immittance.scan import PER_UNIT, SIEMENS, Scan
@@ -28,8 +29,10 @@ def in_unit(scan: Scan, unit: str, kilovolt: float | None) -> Scan:
         return scan
     if kilovolt is None:
         raise InputError(
-            f"{scan.source} is in {scan.unit} and the other side in {unit}: give the rated voltage at the cut, as in "
-            "--voltage '230 kV', of a scan in a case by voltage = \"230 kV\" (the base is 100 MVA)"
+            f"{scan.source} is in {scan.unit} and the other side in {unit}: give the "
+            "rated voltage at the cut, as in "
+            + Option.VOLTAGE
+            + " '230 kV', of a scan in a case by voltage = \"230 kV\" (the base is 100 MVA)"
         )
     return (
         scan.in_siemens(kilovolt)

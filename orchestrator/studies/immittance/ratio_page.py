@@ -8,6 +8,7 @@ import numpy as np
 
 from orchestrator.core.arrays import Complex
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.output.report.html.elements import document, held_data
 from orchestrator.studies.immittance.judgement import CutJudgement, judge_loop
 from orchestrator.studies.immittance.margins import told
@@ -53,7 +54,10 @@ def ratio_page(result: CutResult) -> str:
     source = result.loop.network
     if result.request.scr is None or not isinstance(source, SourceBehind):
         raise InputError(
-            "--html: the page has a slider of the short-circuit ratio; give --scr, the ratio in its middle"
+            Option.HTML
+            + ": the page has a slider of the short-circuit ratio; give "
+            + Option.SCR
+            + ", the ratio in its middle"
         )
     own = result.request.scr
     turn = np.geomspace(1 / _WIDE, _WIDE, _COUNT)

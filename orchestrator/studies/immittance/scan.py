@@ -217,5 +217,6 @@ def check_sign(scan: Scan, option: str) -> None:
     if is_active(scan):
         raise InputError(
             f"{scan.source}: its resistance is negative in both axes at most high frequencies, as if it fed power into "
-            f"every oscillation: are its currents counted out of it (generator sign)? Then give {option}"
+            f"every oscillation: are its currents counted out of it (generator sign)? Then give "
+            + option
         )

@@ -12,6 +12,7 @@ import numpy as np
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.studies.black_box.frequency_response import Excitation
 from orchestrator.studies.black_box.port import start_of
@@ -210,7 +211,8 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
     if request.device is not None:
         if cut is not None and len(cut.devices) > 1:
             raise InputError(
-                f"the cut holds {', '.join(cut.devices)}; name the one that the scan is of by --component"
+                f"the cut holds {', '.join(cut.devices)}; name the one that the scan is of by "
+                + Option.COMPONENT
             )
         scans = {"device": _side(request, request.device, cut, report)}
     if isinstance(request.network, Path):
@@ -279,8 +281,12 @@ def _opened(
     cut = cut_of(case, request.bus, request.components or (() if request.bus else tuple(held)))
     if held and set(cut.devices) != set(held):
         raise InputError(
-            f"{', '.join(held)}: of a case with scans the two sides are all scans and all else, and the cut is at "
-            f"{', '.join(cut.devices)}; leave --bus and --component out"
+            f"{', '.join(held)}: of a case with scans the two sides are all scans and all "
+            f"else, and the cut is at {', '.join(cut.devices)}; leave "
+            + Option.BUS
+            + " and "
+            + Option.COMPONENT
+            + " out"
         )
     request = replace(request, frequency=cut.rated_hz or request.frequency)
     for name, table in held.items():
@@ -312,11 +318,13 @@ def _read(request: CutRequest, side: str, path: Path) -> Scan:
     ]
     if off:
         raise InputError(
-            f"{path.name} was scanned at {off[0]:g} kV, and --voltage is {kv:g} kV; leave the option out"
+            f"{path.name} was scanned at {off[0]:g} kV, and "
+            + Option.VOLTAGE
+            + f" is {kv:g} kV; leave the option out"
         )
     scan = scan.scaled(1.0, PER_UNIT) if side in request.per_unit else scan
     scan = scan.turned_sign() if side in request.generator else scan
-    check_sign(scan, f"--generator {side}")
+    check_sign(scan, (Option.GENERATOR + f" {side}"))
     return scan
 
 
@@ -362,15 +370,22 @@ def _rating(request: CutRequest, cut: Cut | None) -> float | None:
 
 def _source(request: CutRequest, rating: float | None, base: float | None) -> SourceBehind:
     if not (request.scr and request.scr > 0 and request.x_r > 0):
-        raise InputError(f"--scr {request.scr:g}, --x-r {request.x_r:g}: both must exceed 0")
+        raise InputError(
+            Option.SCR
+            + f" {request.scr:g}, "
+            + Option.X_R
+            + f" {request.x_r:g}: both must exceed 0"
+        )
     if rating is None or base is None:
         missing = (
-            "its rating by --rating '100 MVA'"
+            ("its rating by " + Option.RATING + " '100 MVA'")
             if rating is None
-            else "the rated voltage by --voltage '230 kV'"
+            else ("the rated voltage by " + Option.VOLTAGE + " '230 kV'")
         )
         raise InputError(
-            f"--scr: a scan states no rating; give {missing}, to which the short-circuit ratio relates"
+            Option.SCR
+            + f": a scan states no rating; give {missing}, to which the short-circuit ratio "
+            "relates"
         )
     X = base / (request.scr * rating) / math.hypot(1.0, 1 / request.x_r)
     return SourceBehind(
@@ -384,6 +399,8 @@ def _capacitors(loop: CutLoop, request: CutRequest) -> SeriesCapacitors:
     X = float((Z[1, 0] - Z[0, 1]).real / 2)
     if len(Z) != 2 or X <= 0:
         raise InputError(
-            f"--compensation: {loop.network.name} has no inductive reactance at one port to be compensated"
+            Option.COMPENSATION
+            + f": {loop.network.name} has no inductive reactance at one port to be "
+            "compensated"
         )
     return SeriesCapacitors(request.compensation * X, 2 * np.pi * request.frequency)

@@ -10,6 +10,7 @@ from orchestrator.cases.form.given import binding_path
 from orchestrator.core.asked import FLAG, FREQUENCIES, NAME, NAMES, SHARE, FieldKind, Names, asked
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.devices.fmi.devices import as_device
 from orchestrator.studies.points.request import OverPoints, of_scenario, of_values
 
@@ -93,7 +94,12 @@ class InteractionsRequest(OverPoints):
     def given_devices(self) -> tuple[Device, ...]:
         if self.places and not (self.swap or self.devices):
             raise InputError(
-                "--place says where devices are swapped; give --swap or a --device as well"
+                Option.PLACE
+                + " says where devices are swapped; give "
+                + Option.SWAP
+                + " or a "
+                + Option.DEVICE
+                + " as well"
             )
         if isinstance(self.bindings, Mapping):
             lonely = [
@@ -108,7 +114,10 @@ class InteractionsRequest(OverPoints):
                 )
         elif self.bindings and not self.devices:
             raise InputError(
-                "--binding is of a --device; a converter of the case has its binding in the case file"
+                Option.BINDING
+                + " is of a "
+                + Option.DEVICE
+                + "; a converter of the case has its binding in the case file"
             )
         if isinstance(self.devices, Mapping):
             bindings = cast("Mapping[str, Path]", self.bindings or {})

@@ -11,6 +11,7 @@ from orchestrator.cases.form.schema import ComponentTable
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.asked import names
 from orchestrator.core.errors import CaseError, InputError, Problem
+from orchestrator.core.options import Option
 from orchestrator.studies.interactions.exchange import (
     exchanged_case,
     require_same_flow,
@@ -92,8 +93,8 @@ def plan_interactions(case: Case, request: InteractionsRequest) -> InteractionsP
     places = places_of(components, grid)
     if not places:
         raise InputError(
-            f"{case.path}: scenario {name!r} has no converter: no component with the inputs v_re, v_im and the outputs "
-            "i_re, i_im that is no generator; to mark a component as a converter, set 'vendor' in its table"
+            f"{case.source}: scenario {name!r} has no converter: no component with the inputs v_re, v_im and the "
+            "outputs i_re, i_im that is no generator; to mark a component as a converter, set 'vendor' in its table"
         )
     sources = (c.source for c in prepared.system.connections)
     # an emf behind an admittance
@@ -134,8 +135,8 @@ def _scenario(case: Case, wanted: str | None) -> str:
     known = list(case.scenarios)
     if wanted is None and len(known) > 1:
         raise InputError(
-            f"{case.path}: the case has several scenarios, and interactions are those of one; choose it with "
-            f"--scenario: {', '.join(known)}"
+            f"{case.source}: the case has several scenarios, and interactions are those of "
+            "one; choose it with " + Option.SCENARIO + f": {', '.join(known)}"
         )
     return known[0] if wanted is None else wanted
 
@@ -144,7 +145,9 @@ def _swapped(places: Mapping[str, Place], wanted: Sequence[str]) -> tuple[str, .
     unknown = [name for name in wanted if name not in places]
     if unknown:
         raise InputError(
-            f"--place {unknown[0]}: no converter stands there; the places of converters are: {', '.join(places)}"
+            Option.PLACE
+            + f" {unknown[0]}: no converter stands there; the places of converters are: "
+            f"{', '.join(places)}"
         )
     return tuple(dict.fromkeys(wanted)) or tuple(places)
 
@@ -176,7 +179,7 @@ def _tried(
             )
             head = "assignment" if name.kind is Kind.ASSIGNMENT else "stand-in"
             raise CaseError(
-                str(case.path),
+                case.source,
                 [Problem(f"{head}: {what}", str(problem)) for problem in error.problems],
             ) from error
         require_same_flow(voltages, changed)

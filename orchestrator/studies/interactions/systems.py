@@ -8,6 +8,7 @@ from itertools import combinations, product
 from orchestrator.cases.form.devices import Device
 from orchestrator.cases.form.schema import ComponentTable
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.studies.interactions.exchange import file_at, stand_in_at, vendors_device_at
 from orchestrator.studies.interactions.places import Place, first_of, vendors_of
 
@@ -79,18 +80,23 @@ def assignments(
     twice = [device.name for device in given if device.name in vendors]
     if twice:
         raise InputError(
-            f"--device {twice[0]}: a vendor of the case has this name already; give another one, as in NAME=FILE"
+            Option.DEVICE
+            + f" {twice[0]}: a vendor of the case has this name already; give another one, "
+            "as in NAME=FILE"
         )
     devices = [*templates, *(device.name for device in given)]
     if len(devices) < 2:
         raise InputError(
-            f"there is nothing to swap: the only device at {', '.join(at)} is of {devices[0]}; give others by --device"
+            f"there is nothing to swap: the only device at {', '.join(at)} is of "
+            f"{devices[0]}; give others by " + Option.DEVICE
         )
     count = len(devices) ** len(at)
     if count > MOST_ASSIGNMENTS:
         raise InputError(
-            f"{len(devices)} devices at {len(at)} places make {count} assignments, more than the {MOST_ASSIGNMENTS} "
-            f"that are computed; name fewer places by --place (there are: {', '.join(at)}), or give fewer devices"
+            f"{len(devices)} devices at {len(at)} places make {count} assignments, more "
+            f"than the {MOST_ASSIGNMENTS} that are computed; name fewer places by "
+            + Option.PLACE
+            + f" (there are: {', '.join(at)}), or give fewer devices"
         )
     files = {device.name: device for device in given}
 

@@ -22,6 +22,7 @@ from orchestrator.core.asked import (
     plain_value,
 )
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ
 from orchestrator.studies.modes.step_choice import TRIED
 from orchestrator.studies.points.request import (
@@ -191,10 +192,15 @@ class ModesRequest:
 
     def check(self) -> None:
         if self.critical is not None and not self.frequencies[0] > 0:
-            raise InputError("--critical needs --range to begin above 0 Hz, such as 0.1:2")
+            raise InputError(
+                Option.CRITICAL + " needs " + Option.RANGE + " to begin above 0 Hz, such as 0.1:2"
+            )
         if self.black_box and self.directional:
             raise InputError(
-                "--black-box identifies, --directional asks the FMUs for derivatives; give one of them"
+                Option.BLACK_BOX
+                + " identifies, "
+                + Option.DIRECTIONAL
+                + " asks the FMUs for derivatives; give one of them"
             )
 
 

@@ -47,7 +47,7 @@ def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError
     # The same values are refused again by a model of ours; an FMU of others may lack a licence today.
     kind = ErrorKind.START if ours else ErrorKind.FMU
     return StartError(
-        str(prepared.case.path),
-        Problem(prepared.places[name], text, kind, words_of_others=said),
+        prepared.case.source,
+        Problem(prepared.places[name], text, kind),
         name,
     )

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import AnalysisError, CosimError, InputError
 from orchestrator.core.late import pd
+from orchestrator.core.options import Option, command
 from orchestrator.linear.doubts.linearity import doubts, tell
 from orchestrator.linear.models.blocks import Blocks
 from orchestrator.linear.models.linear_model import LinearModel
@@ -157,8 +158,8 @@ def choose_step(
             )
         if len(system.names) > WHOLE:
             raise AnalysisError(
-                f"{len(system.names)} states are too many for all eigenvalues (at most {WHOLE}); `gfor modes "
-                "--critical` compares a few modes"
+                f"{len(system.names)} states are too many for all eigenvalues (at most {WHOLE}"
+                "); " + command("modes", Option.CRITICAL) + " compares a few modes"
             )
         exact = eigenvalues(system)
         critical, growth = _critical(exact, frequency_range), _growth(exact, step_map=False)
@@ -195,7 +196,7 @@ def _fitting(prepared: PreparedScenario, steps: Sequence[float]) -> tuple[list[f
         else:
             found.append(step)
     if not found:
-        raise InputError(f"--try: none fits the case: {why}")
+        raise InputError(Option.TRY + f": none fits the case: {why}")
     return found, left_out
 
 
@@ -208,8 +209,8 @@ def _critical(
     kept = (swings.imag >= low) & (swings.imag <= high) & (ratio <= SWINGING)
     if not kept.any():
         raise AnalysisError(
-            f"no mode from {frequency_range[0]:g} to {frequency_range[1]:g} Hz has less than {100 * SWINGING:g} % "
-            "damping; give another --range"
+            f"no mode from {frequency_range[0]:g} to {frequency_range[1]:g} Hz has less "
+            f"than {100 * SWINGING:g} % damping; give another " + Option.RANGE
         )
     return swings[kept][np.argsort(ratio[kept])][:LEAST_DAMPED]
 

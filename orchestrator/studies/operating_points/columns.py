@@ -42,7 +42,7 @@ class Elements:
         network, table = prepared.network, prepared.case.table.power_flow
         if network is None or table is None:
             raise InputError(
-                f"{prepared.case.path}: a screening needs a power flow of each operating point; give the case a "
+                f"{prepared.case.source}: a screening needs a power flow of each operating point; give the case a "
                 "[power_flow] table and a network"
             )
         switches = prepared.system.components[table.grid].description.variables

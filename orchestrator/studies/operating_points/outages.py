@@ -8,6 +8,7 @@ from orchestrator.cases.flow.connected import connected_parts
 from orchestrator.cases.form.names import close_names
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError, few
+from orchestrator.core.options import Option
 from orchestrator.studies.operating_points.columns import Elements
 
 INTACT = "intact"  # name of the network without an outage
@@ -41,13 +42,13 @@ def read_outages(text: str | None, elements: Elements) -> list[Outage]:
         names += (
             _of_kind(part.lower(), elements)
             if part.lower() in _KINDS
-            else [elements.file.identifier(part, elements.names, "--outages")]
+            else [elements.file.identifier(part, elements.names, Option.OUTAGES)]
         )
     found = [Outage(INTACT)]
     for name in names:
         parts = _WITH_TRANSFORMER.sub(r"\1+\2", name).split("+")
         lost = tuple(
-            elements.file.identifier(one.strip(), elements.names, "--outages") for one in parts
+            elements.file.identifier(one.strip(), elements.names, Option.OUTAGES) for one in parts
         )
         for one in lost:
             if one not in elements.names:
@@ -55,10 +56,10 @@ def read_outages(text: str | None, elements: Elements) -> list[Outage]:
                     one, elements.names, f"write {', '.join(_KINDS)}, or names of elements"
                 )
                 raise InputError(
-                    f"--outages: there is no unit, line, load or shunt {one!r}; {hint}"
+                    Option.OUTAGES + f": there is no unit, line, load or shunt {one!r}; {hint}"
                 )
         if any(set(lost) == set(other.elements) for other in found) or len(set(lost)) < len(lost):
-            raise InputError(f"--outages: {name} is named twice; name it once")
+            raise InputError(Option.OUTAGES + f": {name} is named twice; name it once")
         found.append(Outage(name, lost))
     return found
 

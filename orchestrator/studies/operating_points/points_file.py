@@ -11,6 +11,7 @@ from orchestrator.cases.form.csv_rows import PLACE, Row, place_of, rows_of
 from orchestrator.cases.form.schema import Value
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError, Problem, few
+from orchestrator.core.given_files import ShownFile
 from orchestrator.core.units import read_value
 from orchestrator.studies.operating_points.columns import (
     ACTIVE,
@@ -94,13 +95,13 @@ def _labelled(path: Path) -> tuple[list[Row], str, list[str]]:
     rows = rows_of(path, ())
     if not rows:
         raise InputError(
-            f"{path}: it has no row; give one for each operating point, with a column 'time' or 'name'"
+            f"{ShownFile.of(path)}: it has no row; give one for each operating point, with a column 'time' or 'name'"
         )
     columns = [name for name in rows[0] if name and name != PLACE]
     label = next((name for name in _LABELS if name in columns), None)
     if label is None:
         raise InputError(
-            f"{path}: column 'time' or 'name' is missing; it names the operating points"
+            f"{ShownFile.of(path)}: column 'time' or 'name' is missing; it names the operating points"
         )
     return rows, label, [name for name in columns if name not in (label, "hours")]
 
@@ -121,7 +122,8 @@ def questions_about(
     the slack feeds."""
     rows = rows_of(path, ())
     for column in rows[0]:
-        place, own = f"{path}, line 1: column {column!r}", own_power(column, elements, prepared)
+        place = f"{ShownFile.of(path).at_line(1)}: column {column!r}"
+        own = own_power(column, elements, prepared)
         cells = [text for row in rows if (text := (row[column] or "").strip())]
         most = max((abs(float(text)) for text in cells if own), default=0.0)
         units = elements.balancing_in(column)
@@ -159,7 +161,7 @@ def _static_question(
         return
     who = few([f"{name} ({power:.4g} MW)" for name, power in feeding.items()], 3)
     yield Problem(
-        f"{path}, line 1: column 'load'",
+        f"{ShownFile.of(path).at_line(1)}: column 'load'",
         f"does not scale static generation, loads that feed: {who}; a column 'static' gives their factor: 1 leaves "
         "them as they are, the value of 'load' scales them alike",
     )
@@ -208,7 +210,7 @@ def _reading(path: Path, column: str, elements: Elements, prepared: PreparedScen
     try:
         return reading_of(column, elements, prepared)
     except InputError as error:
-        raise InputError(f"{path}, line 1: column {column!r}: {error}") from error
+        raise InputError(f"{ShownFile.of(path).at_line(1)}: column {column!r}: {error}") from error
 
 
 def _point(

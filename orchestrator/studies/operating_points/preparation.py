@@ -16,6 +16,7 @@ from orchestrator.cases.questions.plausibility import overloads
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.scenario.service import without_units
 from orchestrator.core.errors import CosimError, ErrorKind, InputError, StartError, few
+from orchestrator.core.options import Option
 from orchestrator.studies.operating_points.columns import Elements, least_scale
 from orchestrator.studies.operating_points.item import Item, Status
 from orchestrator.studies.operating_points.outages import Remains, what_remains
@@ -57,7 +58,9 @@ def with_moving_controls(case: Case) -> Case:
     network = case.table.network
     if network is None or network.raw is None:
         raise InputError(
-            "move_controls (--move-controls) is for networks of PSS/E, which [network] has as raw; leave it out"
+            "move_controls ("
+            + Option.MOVE_CONTROLS
+            + ") is for networks of PSS/E, which [network] has as raw; leave it out"
         )
     moving = network.model_copy(update={"move_controls": True})
     return replace(case, table=case.table.model_copy(update={"network": moving}))

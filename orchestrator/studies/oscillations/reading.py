@@ -13,6 +13,7 @@ import numpy as np
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import check_regular
+from orchestrator.core.options import Option
 from orchestrator.core.units import to_unit
 from orchestrator.studies.oscillations.measurements import Kind, Measurements, Site, made_ready
 from orchestrator.studies.oscillations.unused_columns import COLUMN, remarks_on_unused
@@ -45,7 +46,11 @@ def measurements_of(dataset: xr.Dataset, label: str) -> Measurements:
     else:
         places, base, unused = _of_columns(dataset, label)
     if not places:
-        more = "run again with 'record = [\"*\"]' in [solver], or with --force, which records what is needed"
+        more = (
+            "run again with 'record = [\"*\"]' in [solver], or with "
+            + Option.FORCE
+            + ", which records what is needed"
+        )
         raise InputError(
             f"{label}: no place has voltage, P and Q; {more if 'places' in dataset.attrs else _FORM}"
             + "".join(f"; {remark}" for remark in unused)
@@ -158,7 +163,8 @@ def contest_cases(folder: Path) -> list[Path]:
     ]
     if not found:
         raise InputError(
-            f"--contest {folder}: neither it nor a folder in it holds {', '.join(CONTEST_FILES)}"
+            Option.CONTEST
+            + f" {folder}: neither it nor a folder in it holds {', '.join(CONTEST_FILES)}"
         )
     return found
 

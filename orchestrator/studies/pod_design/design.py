@@ -14,6 +14,7 @@ from orchestrator.cases.form.schema import Value
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.asked import DAMPING, FLAG, GAIN, GAIN_BOUNDS, NAME, STAGES, asked
 from orchestrator.core.errors import AnalysisError, InputError
+from orchestrator.core.options import Option
 from orchestrator.linear.doubts.examination import Examination
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.steady_state import find_operating_point
@@ -260,7 +261,10 @@ def design_pod(
     require_controllers([request.controller])
     if request.damping is not None and request.damping_increment is not None:
         raise InputError(
-            "--damping and --damping-increment both say what is required; give one of them"
+            Option.DAMPING
+            + " and "
+            + Option.DAMPING_INCREMENT
+            + " both say what is required; give one of them"
         )
     report("preparing the case")
     target = find_target(
@@ -288,8 +292,8 @@ def design_pod(
         return None if fitting is None else fitting[0]
 
     for value, option in (
-        (request.delta_gain, "--delta-gain"),
-        (request.bounds(search=True)[1], "--gain-bounds"),
+        (request.delta_gain, Option.DELTA_GAIN),
+        (request.bounds(search=True)[1], Option.GAIN_BOUNDS),
     ):
         check_range(
             prepared.system.components, target.components, f"{request.controller}.K", value, option
@@ -513,8 +517,9 @@ def _required(request: DesignRequest, initial: complex) -> float:
     required = request.damping if request.damping is not None else present + request.increment
     if required <= present:
         raise InputError(
-            f"--damping {100 * required:g}: without the controller the mode has {100 * present:.2f} % already; "
-            "ask for more, or for an increase with --damping-increment"
+            Option.DAMPING
+            + f" {100 * required:g}: without the controller the mode has {100 * present:.2f}"
+            " % already; ask for more, or for an increase with " + Option.DAMPING_INCREMENT
         )
     if required >= 1:
         raise InputError(

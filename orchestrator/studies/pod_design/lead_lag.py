@@ -8,6 +8,7 @@ import math
 from dataclasses import dataclass
 
 from orchestrator.core.errors import AnalysisError
+from orchestrator.core.options import Option
 
 LARGEST_STAGE_ANGLE = 60.0
 """Usual limit for the angle of one lead/lag stage [°]; beyond this angle a_j grows out of proportion."""
@@ -51,8 +52,9 @@ def sensitivity(with_gain: complex, without: complex, gain: float) -> complex:
     moved = with_gain - without
     if abs(moved) <= 1e-9 * max(1.0, abs(without)):
         raise AnalysisError(
-            f"a gain of {gain:g} pu moves the mode {without:.4g} rad/s by only {abs(moved):.1e} rad/s, so it has no "
-            "sensitivity to design with; choose another mode, another controller, or a larger --delta-gain"
+            f"a gain of {gain:g} pu moves the mode {without:.4g} rad/s by only "
+            f"{abs(moved):.1e} rad/s, so it has no sensitivity to design with; choose "
+            "another mode, another controller, or a larger " + Option.DELTA_GAIN
         )
     return moved / gain
 
@@ -83,9 +85,10 @@ def lead_lag(phase_deg: float, centre: float, stages: int) -> LeadLag:
     if abs(each) >= 90:
         enough = math.ceil(abs(compensation_deg(phase_deg)) / LARGEST_STAGE_ANGLE)
         raise AnalysisError(
-            f"the sensitivity's angle is {phase_deg:.1f}°, so each of {stages} lead/lag stages would have to turn it "
-            f"by {abs(each):.1f}°; one stage turns by less than 90°, sensibly by {LARGEST_STAGE_ANGLE:g}°; "
-            f"ask for {enough} stages with --stages"
+            f"the sensitivity's angle is {phase_deg:.1f}°, so each of {stages} lead/lag "
+            f"stages would have to turn it by {abs(each):.1f}°; one stage turns by less "
+            f"than 90°, sensibly by {LARGEST_STAGE_ANGLE:g}°; ask for {enough} stages "
+            "with " + Option.STAGES
         )
     sine = math.sin(math.radians(each))
     a = (1 - sine) / (1 + sine)

@@ -11,6 +11,7 @@ from orchestrator.cases.form.parameter_files import ParameterFile
 from orchestrator.cases.form.schema import CaseTable, NamedModeTable, Value
 from orchestrator.cases.questions.idle_values import DAMPING_CONTROLLERS
 from orchestrator.core.errors import InputError, few
+from orchestrator.core.options import Option
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.studies.pod_design.stages import (
     GAIN_ALONE,
@@ -70,7 +71,8 @@ class Target:
         if not all(variable in plan[name].description.variables for name in self.components):
             return []
         return [
-            f"--set {name}.{variable}={-plan[name].number(variable):g}" for name in self.components
+            (Option.SET + f" {name}.{variable}={-plan[name].number(variable):g}")
+            for name in self.components
         ]
 
 
@@ -102,8 +104,9 @@ def find_target(
     others = [name for name in chosen if name not in fixed]
     if others:
         raise InputError(
-            f"{fixed[0]} has a fixed number of stages (it has no variable {controller}.N_S), {others[0]} has not; they "
-            f"cannot have one setting: design them one after the other with --component"
+            f"{fixed[0]} has a fixed number of stages (it has no variable {controller}"
+            f".N_S), {others[0]} has not; they cannot have one setting: design them one "
+            "after the other with " + Option.COMPONENT
         )
     (prepared,) = case.prepare([scenario], overrides, None, None, parameters)
     counts = {name: count_stages(prepared, name, controller) for name in fixed}
@@ -111,13 +114,15 @@ def find_target(
     other = next((name for name, count in counts.items() if count != number), None)
     if other:
         raise InputError(
-            f"{fixed[0]} has {number} fixed stages in {controller}, {other} has {counts[other]}; they cannot have one "
-            "setting: design them one after the other with --component"
+            f"{fixed[0]} has {number} fixed stages in {controller}, {other} has "
+            f"{counts[other]}; they cannot have one setting: design them one after the "
+            "other with " + Option.COMPONENT
         )
     if stages not in (None, number):
         raise InputError(
-            f"--stages {stages}: {fixed[0]} has {number} stages in {controller}, a fixed number (it has no variable "
-            f"{controller}.N_S); leave --stages out"
+            Option.STAGES
+            + f" {stages}: {fixed[0]} has {number} stages in {controller}, a fixed number "
+            f"(it has no variable {controller}.N_S); leave " + Option.STAGES + " out"
         )
     return Target(scenario, chosen, key, number, times[fixed[0]])
 
@@ -135,13 +140,16 @@ def _target_of_gains(
     other = next((name for name in found.components if name not in alone), None)
     if other:
         raise InputError(
-            f"{first} has a lead/lag that cannot be set ({', '.join(fixed)}), {other} has one that can; they cannot "
-            "have one setting: design them one after the other with --component"
+            f"{first} has a lead/lag that cannot be set ({', '.join(fixed)}), {other} has "
+            "one that can; they cannot have one setting: design them one after the other "
+            "with " + Option.COMPONENT
         )
     if stages is not None:
         raise InputError(
-            f"--stages {stages}: the lead/lag of {first}.{controller} cannot be set ({', '.join(fixed)}), so that only "
-            "its gain is designed; leave --stages out"
+            Option.STAGES + f" {stages}: the lead/lag of {first}.{controller} cannot be set ("
+            f"{', '.join(fixed)}), so that only its gain is designed; leave "
+            + Option.STAGES
+            + " out"
         )
     named = [
         f"{name}.{variable}"
@@ -163,7 +171,8 @@ def find_scenario(
     if scenario is not None:
         if scenario not in case.scenarios:
             raise InputError(
-                f"--scenario: there is no scenario {scenario!r}; the case has: {', '.join(case.scenarios)}"
+                Option.SCENARIO + f": there is no scenario {scenario!r}; the case has: "
+                f"{', '.join(case.scenarios)}"
             )
         return scenario
     plans = {name: case.components_of(name, overrides, parameters) for name in case.scenarios}
@@ -183,8 +192,10 @@ def find_scenario(
         what = "no scenario" if not fitting else f"more than one scenario ({', '.join(fitting)})"
         lacking = "" if fitting else "".join(map(_lacking, plans.values(), repeat(controller)))
         raise InputError(
-            f"{case.name}: {what} has components with {controller} and every POD off, which is what a design "
-            f"starts from; name one with --scenario, from: {', '.join(case.scenarios)}{lacking}"
+            f"{case.name}: {what} has components with {controller} and every POD off, "
+            "which is what a design starts from; name one with "
+            + Option.SCENARIO
+            + f", from: {', '.join(case.scenarios)}{lacking}"
         )
     return fitting[0]
 
@@ -217,8 +228,10 @@ def _components(
     chosen = [name for name in fitting if name in having]
     if not chosen:
         raise InputError(
-            f"--component {pattern}: scenario {scenario!r} has no component of that name with {controller}; "
-            f"those with it: {', '.join(having[:12])}{' …' if len(having) > 12 else ''}"
+            Option.COMPONENT
+            + f" {pattern}: scenario {scenario!r} has no component of that name with "
+            f"{controller}; those with it: {', '.join(having[:12])}"
+            f"{(' …' if len(having) > 12 else '')}"
         )
     key = (pattern,) if pattern is not None and chosen == fitting else tuple(chosen)
     return tuple(chosen), key
@@ -233,12 +246,13 @@ def _stages_set(
     """The number that is asked for, or that the components' N_S have."""
     present = {int(plan[name].number(f"{controller}.N_S")) for name in chosen}
     if stages is not None:
-        check_range(plan, chosen, f"{controller}.N_S", stages, "--stages")
+        check_range(plan, chosen, f"{controller}.N_S", stages, Option.STAGES)
         return stages
     if len(present) > 1:
         raise InputError(
-            f"the components {', '.join(chosen[:12])} have different numbers of stages ({controller}.N_S = "
-            f"{', '.join(map(str, sorted(present)))}); give them one number with --stages"
+            f"the components {', '.join(chosen[:12])} have different numbers of stages ("
+            f"{controller}.N_S = {', '.join(map(str, sorted(present)))}); give them one "
+            "number with " + Option.STAGES
         )
     return present.pop()
 
@@ -256,7 +270,8 @@ def check_range(
         high = info.maximum if info.maximum is not None else math.inf
         if not low <= value <= high:
             raise InputError(
-                f"{option}: {value:g} is out of range: {name}.{variable} takes from {low:g} to {high:g}"
+                option
+                + f": {value:g} is out of range: {name}.{variable} takes from {low:g} to {high:g}"
             )
 
 
@@ -271,7 +286,9 @@ def mode_name(case: Case, wanted: str | None) -> str:
     names = [table.name for table in case.table.analysis.modes] or [CRITICAL]
     name = wanted if wanted is not None else names[0]
     if name not in names:
-        raise InputError(f"--mode: the case names no mode {name!r}; it names: {', '.join(names)}")
+        raise InputError(
+            Option.MODE + f": the case names no mode {name!r}; it names: {', '.join(names)}"
+        )
     return name
 
 

@@ -9,6 +9,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from orchestrator.core.spelling import Text, restored, stored
 from orchestrator.studies.points.store import Arrays
 
 
@@ -35,6 +36,8 @@ class _Packing:
             first = self._sizes.get(kind, 0)
             self._sizes[kind] = first + value.size
             return [kind, first, list(value.shape)]
+        if isinstance(value, Text) and not isinstance(value, Enum):
+            return stored(value)
         if isinstance(value, np.generic | Enum):
             return value.item() if isinstance(value, np.generic) else value.value
         if is_dataclass(value):
@@ -56,6 +59,8 @@ def unpacked(kind: Any, value: Any, arrays: Arrays) -> Any:
     if origin is np.ndarray:
         name, first, shape = value
         return arrays[name][first : first + int(np.prod(shape))].reshape(shape)
+    if kind is str and isinstance(value, list):
+        return restored(value)
     if is_dataclass(kind):
         types: dict[str, Any] = _types(kind)  # type: ignore[arg-type]
         if set(types) != set(value):

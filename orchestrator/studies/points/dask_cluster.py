@@ -19,6 +19,7 @@ from urllib.parse import urlsplit
 
 from fmus.toolchain.extras import require
 from orchestrator.core.errors import CosimError, ErrorKind, InputError
+from orchestrator.core.options import Option
 from orchestrator.studies.points.executor import ATTEMPTS, Result, Task, WorkerLostError
 
 INTERVAL = 5.0  # seconds between two looks at the workers
@@ -41,12 +42,17 @@ class ClusterWatch:
         }
         if found and not self.able:
             raise InputError(
-                f"--scheduler {address}: none of its {len(found)} workers can import gfor-cosim"
-                f"{next(iter(self.unable.values()))}; install it, in this version, where they run"
+                Option.SCHEDULER
+                + f" {address}: none of its {len(found)} workers can import gfor-cosim"
+                f"{next(iter(self.unable.values()))}; install it, in this version, where they "
+                "run"
             )
         for worker, error in self.unable.items():
             _LOG.warning(
-                "--scheduler %s: worker %s cannot import gfor-cosim%s and is given nothing",
+                (
+                    Option.SCHEDULER
+                    + " %s: worker %s cannot import gfor-cosim%s and is given nothing"
+                ),
                 address,
                 worker,
                 error,
@@ -62,7 +68,7 @@ class ClusterWatch:
         workers = self._workers() - set(self.unable)
         for worker in sorted(self._known - workers):
             _LOG.warning(
-                "--scheduler %s: worker %s is lost%s; %s",
+                (Option.SCHEDULER + " %s: worker %s is lost%s; %s"),
                 self._address,
                 worker,
                 self._last_error(worker),
@@ -75,9 +81,12 @@ class ClusterWatch:
         elif now - self._seen > self._patience:
             errors = sorted({self._last_error(worker) for worker in self._errors})
             raise CosimError(
-                f"--scheduler {self._address}: no usable worker is left since {now - self._seen:.0f} s"
-                f"{errors[0] if errors else ''}; points that were computed are kept. Start workers with "
-                f"`dask worker {self._address}`, and give the same command again",
+                (
+                    Option.SCHEDULER
+                    + f" {self._address}: no usable worker is left since {now - self._seen:.0f} s"
+                    f"{(errors[0] if errors else '')}; points that were computed are kept. Start "
+                    f"workers with `dask worker {self._address}`, and give the same command again"
+                ),
                 kind=ErrorKind.WORKER_LOST,
             )
 
@@ -126,12 +135,17 @@ class DaskCluster:
             return
         if not address.startswith("tls://"):
             raise InputError(
-                f"--scheduler {address}: --tls needs an address that begins with tls://"
+                Option.SCHEDULER
+                + f" {address}: "
+                + Option.TLS
+                + " needs an address that begins with tls://"
             )
         missing = [name for name in TLS_FILES if not (tls / name).is_file()]
         if missing:
             raise InputError(
-                f"--tls {tls}: there is no {' and no '.join(missing)}; the folder must hold {', '.join(TLS_FILES)}"
+                Option.TLS
+                + f" {tls}: there is no {' and no '.join(missing)}; the folder must hold "
+                f"{', '.join(TLS_FILES)}"
             )
 
     def run(
@@ -161,9 +175,12 @@ class DaskCluster:
     def _client(self, distributed: Any, loop: Any) -> Any:
         if not (self.address.startswith("tls://") or _on_this_machine(self.address)):
             _LOG.warning(
-                "--scheduler %s: the connection is not encrypted and nobody is checked; whoever can reach the "
-                "scheduler can run programs on its workers and on this machine: use tls:// and --tls outside of a "
-                "network of your own",
+                (
+                    Option.SCHEDULER
+                    + " %s: the connection is not encrypted and nobody is checked; whoever can "
+                    "reach the scheduler can run programs on its workers and on this machine: "
+                    "use tls:// and " + Option.TLS + " outside of a network of your own"
+                ),
                 self.address,
             )
         security = self._security(distributed)
@@ -181,16 +198,19 @@ class DaskCluster:
             TypeError,
         ) as error:  # Dask's, in this order: no answer, address, certificates
             raise InputError(
-                f"--scheduler {self.address}: no Dask scheduler answers there ({error}); start one with "
-                "`dask scheduler`, and give its address, such as tcp://host:8786, or tls://host:8786 with --tls"
+                Option.SCHEDULER
+                + f" {self.address}: no Dask scheduler answers there ({error}); start one with "
+                "`dask scheduler`, and give its address, such as tcp://host:8786, or "
+                "tls://host:8786 with " + Option.TLS
             ) from error
         try:
             client.wait_for_workers(1, timeout=_PATIENCE)
         except TimeoutError as error:
             client.close()
             raise InputError(
-                f"--scheduler {self.address}: the scheduler has no workers; start some with "
-                f"`dask worker {self.address}` where gfor-cosim is installed"
+                Option.SCHEDULER
+                + f" {self.address}: the scheduler has no workers; start some with `dask worker "
+                f"{self.address}` where gfor-cosim is installed"
             ) from error
         return client
 
@@ -220,8 +240,9 @@ class DaskCluster:
             )
         if isinstance(error, ImportError):
             raise InputError(
-                f"--scheduler {self.address}: a worker cannot import what it needs ({error}); install gfor-cosim, "
-                "in this version, where the workers run"
+                Option.SCHEDULER
+                + f" {self.address}: a worker cannot import what it needs ({error}); install "
+                "gfor-cosim, in this version, where the workers run"
             ) from error
         return future.result()
 
@@ -269,7 +290,7 @@ def _on_this_machine(address: str) -> bool:
 
 
 def _distributed() -> Any:
-    require("--scheduler", "distributed")
+    require(Option.SCHEDULER, "distributed")
     import distributed  # noqa: PLC0415 - of the extra `cluster`, and slow to import
 
     return distributed

@@ -8,7 +8,7 @@ from typing import Protocol, Self
 import numpy as np
 
 from orchestrator.core.errors import CaseError, CosimError, ErrorKind
-from orchestrator.core.spelling import as_options
+from orchestrator.core.spelling import as_options, joined
 
 
 @dataclass(frozen=True)
@@ -18,12 +18,11 @@ class Failure:
     lasting: bool
 
     @classmethod
-    @as_options()  # the same for everybody, wherever it was computed
     def of(cls, error: BaseException) -> Self:
         if isinstance(error, CosimError):
-            text = (
-                "; ".join(map(str, error.problems)) if isinstance(error, CaseError) else str(error)
-            )
+            text = error.message
+            if isinstance(error, CaseError):
+                text = joined("; ", [problem.message for problem in error.problems])
             return cls(error.kind, text, error.kind.lasting)
         if isinstance(error, np.linalg.LinAlgError):
             return cls(ErrorKind.ANALYSIS, f"no eigenvalues: {error}", True)
@@ -34,7 +33,7 @@ class Failure:
         return cls(ErrorKind.WORKER_LOST, str(error), False)
 
     def __str__(self) -> str:
-        return self.text
+        return str(self.text)
 
 
 class Failing(Protocol):

@@ -79,8 +79,8 @@ def same_case(
     here = fingerprint(case)
     if here.partition("-")[0] != wanted.partition("-")[0]:
         raise InputError(
-            f"{case.path}: a worker has other code of gfor-cosim or of its libraries than the study was started with; "
-            "give all machines the same versions, and restart the workers"
+            f"{case.source}: a worker has other code of gfor-cosim or of its libraries than the study was "
+            "started with; give all machines the same versions, and restart the workers"
         )
     if here != wanted:
         own = [
@@ -88,7 +88,7 @@ def same_case(
         ]
         which = f", or one of its parameter files ({', '.join(own)})" if own else ""
         raise InputError(
-            f"{case.path}: this file{which} has another text now than when the study loaded it; load the case again, "
+            f"{case.source}: this file{which} has another text now than when the study loaded it; load the case again, "
             "and on a cluster give all machines the same files"
         )
     return replace(case, varied=varied) if varied else case

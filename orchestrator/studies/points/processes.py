@@ -18,6 +18,7 @@ from types import FrameType
 from typing import Any
 
 from fmus.toolchain.temporary import leave, own_folder, remove
+from orchestrator.core.options import Option
 from orchestrator.devices.fmi.interrupts import calls
 from orchestrator.studies.points.executor import ATTEMPTS, Result, Task, WorkerLostError
 from orchestrator.studies.points.main_guard import require_main_guard
@@ -120,8 +121,8 @@ class Processes:
             finally:
                 pool.shutdown(wait=True, cancel_futures=True)
         return WorkerLostError(
-            f"its worker process died {ATTEMPTS} times; is there too little memory? Try fewer --workers, "
-            "or this point alone with `gfor modes`"
+            f"its worker process died {ATTEMPTS} times; is there too little memory? Try "
+            "fewer " + Option.WORKERS + ", or this point alone with `gfor modes`"
         )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.core.errors import InputError, ResultsError
+from orchestrator.core.options import Option
 from orchestrator.core.safe_files import PARTIAL, made_folder, replacing
 
 Arrays = dict[str, NDArray[Any]]
@@ -49,8 +50,9 @@ class PointStore:
                 )
         except ResultsError as error:
             raise InputError(
-                f"--out: a finished point cannot be kept: {error}, and start the same command again: what is written "
-                "stays"
+                Option.OUT
+                + f": a finished point cannot be kept: {error}, and start the same command "
+                "again: what is written stays"
             ) from error
 
     def _path(self, key: str) -> Path:

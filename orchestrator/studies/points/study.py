@@ -13,6 +13,7 @@ from orchestrator.cases.case import Case
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.cores import number_of_cores
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.studies.points.dask_cluster import DaskCluster
 from orchestrator.studies.points.executor import Executor, Serial
 from orchestrator.studies.points.points import CountReport, Work
@@ -41,7 +42,9 @@ def choose_executor(
         return DaskCluster(scheduler, None if tls is None else Path(tls))
     if tls is not None:
         raise InputError(
-            f"--tls {tls}: certificates are for a Dask cluster; name its address with --scheduler"
+            Option.TLS
+            + f" {tls}: certificates are for a Dask cluster; name its address with "
+            + Option.SCHEDULER
         )
     if workers is not None and (
         isinstance(workers, bool) or not isinstance(workers, int) or workers < 1

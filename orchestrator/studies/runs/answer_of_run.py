@@ -6,6 +6,7 @@ from functools import cached_property
 from math import ceil
 
 from orchestrator.core.errors import RunInterruptedError
+from orchestrator.core.options import Option
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.output.report.tables import short
 from orchestrator.simulation.watch.confirmation import PERIODS
@@ -147,9 +148,9 @@ def _of_a_missing_limit(shown: _Response) -> ScenarioAnswer | None:
     names = ", ".join(dict.fromkeys(finding.component for finding in missing))
     table = shown.result.modes.prepared.case.table
     both = table.models and table.emt.step_size
-    how = "--set models=emt" if both else "EMT models, whose names lack `_phasor`"
+    how = (Option.SET + " models=emt") if both else "EMT models, whose names lack `_phasor`"
     return shown.not_known(
-        f"the current limit of {names} would act, which the model lacks: repeat with {how}"
+        f"the current limit of {names} would act, which the model lacks: repeat with " + how
     )
 
 
@@ -157,7 +158,8 @@ def _of_an_early_stop(shown: _Response) -> ScenarioAnswer | None:
     if not shown.result.before_its_events:
         return None
     return shown.not_known(
-        f"the run ends at {shown.end:g} s, before its events (t = {shown.later}): without --stop it reaches them"
+        f"the run ends at {shown.end:g} s, before its events (t = {shown.later}): "
+        "without " + Option.STOP + " it reaches them"
     )
 
 
@@ -195,7 +197,9 @@ def _of_a_short_run(shown: _Response) -> ScenarioAnswer | None:
     if wanted <= shown.end:
         return None
     return shown.not_known(
-        f"the run is too short to show whether what the events leave settles: --stop {wanted:g}"
+        "the run is too short to show whether what the events leave settles: "
+        + Option.STOP
+        + f" {wanted:g}"
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import ComponentError, InputError, ResultsError
+from orchestrator.core.options import Option
 from orchestrator.core.safe_files import write_text
 from orchestrator.output.results import checkpoint_file
 from orchestrator.output.results.netcdf import DAMAGED, stored_name
@@ -115,8 +116,8 @@ class Checkpoints:
                 self.clear()
         except OSError as error:
             raise InputError(
-                f"{folder}: checkpoints cannot be kept there: {error.strerror}; choose another folder, or leave them "
-                "out with --checkpoint 0"
+                f"{folder}: checkpoints cannot be kept there: {error.strerror}; choose "
+                "another folder, or leave them out with " + Option.CHECKPOINT + " 0"
             ) from error
         self._begun = perf_counter()
         self._due = self._begun + every
@@ -222,7 +223,8 @@ class Checkpoints:
             return state
         if damaged:
             raise InputError(
-                f"scenario {self._name!r} cannot be resumed: {'; '.join(damaged)}; start it anew, without --resume"
+                f"scenario {self._name!r} cannot be resumed: {'; '.join(damaged)}; start it "
+                "anew, without " + Option.RESUME
             )
         return None
 
@@ -234,6 +236,6 @@ class Checkpoints:
         said = differences(then, self._mark, None if was is None else (was, self._text), self._file)
         if said:
             raise InputError(
-                f"scenario {self._name!r} cannot be resumed: {said}; bring that back to what it was, or start the run "
-                "anew, without --resume"
+                f"scenario {self._name!r} cannot be resumed: {said}; bring that back to what "
+                "it was, or start the run anew, without " + Option.RESUME
             )

@@ -17,6 +17,7 @@ from orchestrator.core.errors import (
     ResultsError,
     RunInterruptedError,
 )
+from orchestrator.core.options import Option
 from orchestrator.devices.fmi.component import Component
 from orchestrator.devices.fmi.instance import is_isolated, protections_of
 from orchestrator.devices.fmi.interrupts import calls
@@ -225,7 +226,11 @@ def _run(
         if (lacking := missing(found))
     )
     inside = tuple(
-        f"component {name!r} runs in gfor's own process, because the case and --trust-fmus say so"
+        (
+            f"component {name!r} runs in gfor's own process, because the case and "
+            + Option.TRUST_FMUS
+            + " say so"
+        )
         for name, plan in prepared.system.components.items()
         if plan.isolated is False and is_isolated(plan.description, None)
     )
@@ -262,7 +267,7 @@ def _response_of(master: Master, prepared: PreparedScenario) -> xr.Dataset:
     try:
         return linear_response(master, prepared)
     except NoLinearResponseError as error:
-        raise InputError(f"{error}; leave --linear out") from error
+        raise InputError(f"{error}; leave " + Option.LINEAR + " out") from error
 
 
 def _diverging(master: Master) -> list[str]:

@@ -17,6 +17,7 @@ from orchestrator.core.asked import (
     read_percent,
 )
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.studies.points.request import (
     POINTS_FILE,
     OverCluster,
@@ -101,6 +102,8 @@ class ScreeningRequest(OverCluster):
         low, high = self.frequencies
         if not low > 0:
             raise InputError(
-                f"frequencies {low:g}:{high:g} (--range): a screening begins above 0 Hz"
+                f"frequencies {low:g}:{high:g} ("
+                + Option.RANGE
+                + "): a screening begins above 0 Hz"
             )
         return CriticalRegion(low, high, self.damping)

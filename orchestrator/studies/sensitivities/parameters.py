@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from orchestrator.cases.form.names import close_names
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.devices.fmi.description import FmuDescription, VariableInfo
 from orchestrator.systems.coupling.master import Master
 
@@ -98,12 +99,13 @@ def _check_fits(
     for name, (_, info) in everything.items():
         if fnmatch.fnmatchcase(name, pattern):
             raise InputError(
-                f"--parameter {pattern}: {name} is of type {info.type}, by which nothing can be differentiated; "
-                "name a Real parameter"
+                Option.PARAMETER
+                + f" {pattern}: {name} is of type {info.type}, by which nothing can be "
+                "differentiated; name a Real parameter"
             )
     hint = close_names(pattern, real, "`gfor fmu info` lists the parameters of an FMU")
     raise InputError(
-        f"--parameter {pattern}: no component of the scenario has such a parameter; {hint}"
+        Option.PARAMETER + f" {pattern}: no component of the scenario has such a parameter; {hint}"
     )
 
 

@@ -14,6 +14,7 @@ from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.asked import names as names_of
 from orchestrator.core.errors import AnalysisError, CaseError, CosimError, InputError
+from orchestrator.core.options import Option
 from orchestrator.devices.fmi.component import RealBatch
 from orchestrator.linear.doubts.coupled_response import foreign_components
 from orchestrator.linear.doubts.linearity import eigenvalue_shifts
@@ -49,8 +50,9 @@ _SAME = 0.1
 _FAR = 0.1  # step map and continuous model disagree on a derivative from this part on
 
 _NO_STEADY_STATE = (
-    "with another value the system has no steady state at rated frequency; --held gives the effect at the held "
-    "operating point"
+    "with another value the system has no steady state at rated frequency; "
+    + Option.HELD
+    + " gives the effect at the held operating point"
 )
 
 Again = Callable[[Mapping[str, float]], PreparedScenario]
@@ -133,7 +135,8 @@ def find_sensitivities(
     patterns, report = names_of(request.parameters, "parameters"), request.report
     if held and request.fixed:
         raise InputError(
-            "--held holds the operating point, which a fixed parameter moves; give one of them"
+            Option.HELD
+            + " holds the operating point, which a fixed parameter moves; give one of them"
         )
     with running(prepared) as master:
         point = find_operating_point(master)
@@ -157,7 +160,10 @@ def find_sensitivities(
         for parameter in parameters:
             if held and not parameter.tunable:
                 rows[parameter] = _none(
-                    parameter, chosen, "held", "a fixed parameter moves the start: leave --held out"
+                    parameter,
+                    chosen,
+                    "held",
+                    ("a fixed parameter moves the start: leave " + Option.HELD + " out"),
                 )
             elif held or (parameter.tunable and _stays(master, parameter, blocks.period)):
                 row = _row(
@@ -222,14 +228,17 @@ def _chosen(found: ModesResult, name: str | None) -> Mode:
             return found.named[name]
         known = ", ".join([*found.named, CRITICAL])
         if name in found.unnamed:
-            raise InputError(f"--mode {name}: {found.unnamed[name]}; there are: {known}")
+            raise InputError(Option.MODE + f" {name}: {found.unnamed[name]}; there are: {known}")
         raise InputError(
-            f"--mode {name}: scenario {found.prepared.name!r} has no mode of this name; it has: {known}"
+            Option.MODE
+            + f" {name}: scenario {found.prepared.name!r} has no mode of this name; it has: "
+            f"{known}"
         )
     swinging = [mode for mode in found.modes if mode.is_oscillation]
     if not swinging:
         raise InputError(
-            f"scenario {found.prepared.name!r} has no oscillation in the range; give another --range"
+            f"scenario {found.prepared.name!r} has no oscillation in the range; give "
+            "another " + Option.RANGE
         )
     return swinging[0]
 

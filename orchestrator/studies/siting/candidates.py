@@ -8,6 +8,7 @@ from orchestrator.cases.form.names import close_names
 from orchestrator.cases.questions.plausible_ranges import SMALLEST_SHARE
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError, Problem, few
+from orchestrator.core.options import Option
 
 # load of a plant's own at its terminal, in parts of the rating there
 _AUXILIARY = 0.05
@@ -24,13 +25,13 @@ def candidates(wanted: Sequence[str], prepared: PreparedScenario) -> list[str]:
     found = {
         name: fnmatch.filter(known, name)
         or fnmatch.filter(known, f"bus_{name}")
-        or fnmatch.filter(known, prepared.names.identifier(name, known, "--buses"))
+        or fnmatch.filter(known, prepared.names.identifier(name, known, Option.BUSES))
         for name in wanted
     }
     unknown = [name for name, there in found.items() if not there]
     if unknown:
         hint = close_names(unknown[0], known, f"the buses are {few(known, 8)}")
-        raise InputError(f"--buses {unknown[0]}: there is no such bus; {hint}")
+        raise InputError(Option.BUSES + f" {unknown[0]}: there is no such bus; {hint}")
     if wanted:
         return list(dict.fromkeys(bus for there in found.values() for bus in there))
     left_out = {*unit_terminals(prepared)}
@@ -74,5 +75,5 @@ def question_about(rating: float | None, prepared: PreparedScenario) -> Problem 
         return None
     beside = f"{rating:g} MVA beside {largest}'s {ratings[largest]:g} MVA; is it in MVA?"
     return Problem(
-        "--rating", f"{beside} Write it with its unit, such as 250MVA, if another is meant"
+        Option.RATING, f"{beside} Write it with its unit, such as 250MVA, if another is meant"
     )

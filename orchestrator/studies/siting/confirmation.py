@@ -9,6 +9,7 @@ import numpy as np
 
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import AnalysisError, CosimError
+from orchestrator.core.options import Option
 from orchestrator.linear.models.component_linearization import ComponentLinearization
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.linearization import Blocks
@@ -256,8 +257,9 @@ def same_mode(mode: Mode, model: LinearModel) -> Eigenpair:
     best = max(alike, key=lambda k: alike[k])
     if alike[best] < _SAME:
         raise AnalysisError(
-            f"with the device no mode is like that of {mode.frequency_hz:.3f} Hz any more (at most {alike[best]:.2f} "
-            "of 1): it changes too much; take a smaller --rating"
+            f"with the device no mode is like that of {mode.frequency_hz:.3f} Hz any more "
+            f"(at most {alike[best]:.2f} of 1): it changes too much; take a smaller "
+            + Option.RATING
         )
     return pairs[best]
 

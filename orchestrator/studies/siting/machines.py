@@ -10,6 +10,7 @@ from orchestrator.cases.case import Case
 from orchestrator.cases.form.schema import Value
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import AnalysisError, CosimError, InputError
+from orchestrator.core.options import Option
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.linearization import Blocks
 from orchestrator.linear.models.state_space import StateSpace, state_space
@@ -114,8 +115,10 @@ def find_machines(
     regulated = [name for name in machines if _REFERENCE in plans[name].description.variables]
     if not regulated:
         raise InputError(
-            f"scenario {scenario!r}: no machine has a voltage regulator with a reference ({_REFERENCE}) that a POD "
-            "could move; take --device pod_q, a converter's, or a scenario whose machines have exciters"
+            f"scenario {scenario!r}: no machine has a voltage regulator with a reference ("
+            f"{_REFERENCE}) that a POD could move; take "
+            + Option.DEVICE
+            + " pod_q, a converter's, or a scenario whose machines have exciters"
         )
     stabilised = [
         name
@@ -155,16 +158,19 @@ def _of_parts(plan: ComponentPlan) -> bool:
 
 def _check(request: SiteRequest) -> None:
     given = {
-        "--outages": request.outages is not None,
-        "--buses": bool(request.buses),
-        "--rating": request.rating is not None,
-        "--binding": request.binding is not None,
+        Option.OUTAGES: request.outages is not None,
+        Option.BUSES: bool(request.buses),
+        Option.RATING: request.rating is not None,
+        Option.BINDING: request.binding is not None,
     }
     wrong = [name for name, is_given in given.items() if is_given]
     if wrong:
         raise InputError(
-            f"{wrong[0]} belongs to a device at a bus, and --device {request.name} is one at a machine: leave it out, "
-            "or take --device pod_q"
+            f"{wrong[0]} belongs to a device at a bus, and "
+            + Option.DEVICE
+            + f" {request.name} is one at a machine: leave it out, or take "
+            + Option.DEVICE
+            + " pod_q"
         )
 
 
@@ -199,7 +205,8 @@ def _poor(found: ModesResult, below: float) -> dict[str, Mode]:
     swings = [mode for mode in found.modes if mode.is_oscillation]
     if not swings:
         raise InputError(
-            f"scenario {found.prepared.name!r} has no oscillation in the range; give another --range"
+            f"scenario {found.prepared.name!r} has no oscillation in the range; give "
+            "another " + Option.RANGE
         )
     poor = [mode for mode in swings if mode.damping_percent < below] or swings[:1]
     labels = dict[str, Mode]()

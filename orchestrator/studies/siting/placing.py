@@ -14,6 +14,7 @@ from orchestrator.cases.form.schema import ComponentTable
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Vector
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.linear.models.component_linearization import ComponentLinearization
 from orchestrator.systems.coupling.master import Master
 
@@ -35,7 +36,9 @@ def foreign(fmu: Path, binding: Path | None, rating: float | None) -> ComponentT
     for path in (fmu, *([binding] if binding else [])):
         if not path.is_file():
             raise InputError(
-                f"{path}: there is no such file; --device takes pod_p, pod_q, droop or the path of an FMU"
+                f"{path}: there is no such file; "
+                + Option.DEVICE
+                + " takes pod_p, pod_q, droop or the path of an FMU"
             )
     own = str(binding.absolute()) if binding else None
     values = {"P_0": 0.0, "Q_0": 0.0, **({} if rating is None else {"S_n": rating})}
@@ -54,7 +57,7 @@ def placed(case: Case, device: ComponentTable, buses: Sequence[str]) -> Case:
     taken = [name for name in further if name in table.components]
     if taken:
         raise InputError(
-            f"{case.path}: the name {taken[0]!r} is for what `gfor site` puts there; give it another name"
+            f"{case.source}: the name {taken[0]!r} is for what `gfor site` puts there; give it another name"
         )
     grid = table.power_flow.grid if table.power_flow else ""
     groups = table.solver.groups

@@ -66,7 +66,7 @@ def situation_of(
     network, table = prepared.network, prepared.case.table.power_flow
     if network is None or table is None or prepared.schedule.is_second_order:
         raise InputError(
-            f"{prepared.case.path}: a place is looked for among the buses of a grid component, with the schedule "
+            f"{prepared.case.source}: a place is looked for among the buses of a grid component, with the schedule "
             "gauss-seidel or jacobi; give the case a [power_flow] table whose grid is a model with a network"
         )
     outputs = [f"{table.grid}.{bus}.v_{part}" for bus in network.buses for part in ("re", "im")]

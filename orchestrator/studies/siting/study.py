@@ -23,6 +23,7 @@ from orchestrator.core.asked import (
 )
 from orchestrator.core.asked import positive as above_zero
 from orchestrator.core.errors import CosimError, InputError
+from orchestrator.core.options import Option
 from orchestrator.linear.models.linearization import Blocks
 from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.linear.spectra.modes import damping_percent
@@ -209,7 +210,9 @@ def find_sites(
     """Linearise the case with and without outages, shift its modes by a device at every bus, and confirm the best."""
     if request.is_foreign and not request.name.lower().endswith(".fmu"):
         raise InputError(
-            f"--device {request.device}: give pod_p, pod_q, droop, regulator or the path of an .fmu"
+            Option.DEVICE
+            + f" {request.device}: give pod_p, pod_q, droop, regulator or the path of an "
+            ".fmu"
         )
     scenario = request.scenario or next(iter(case.scenarios))
     open_case = replace(case, injections=True)
@@ -236,7 +239,8 @@ def find_sites(
     if not situations or situations[0].name != INTACT:
         low, high = request.frequencies
         raise InputError(
-            f"scenario {scenario!r} has no oscillation from {low:g} to {high:g} Hz; give another --range"
+            f"scenario {scenario!r} has no oscillation from {low:g} to {high:g} Hz; give "
+            "another " + Option.RANGE
         )
     result = _shifted(case, request, situations, not_judged, scenario)
     result = replace(
@@ -246,7 +250,7 @@ def find_sites(
     )
     if not result.ranking:
         raise InputError(
-            f"--buses: {', '.join(request.buses)}: an outage cuts them off; give others"
+            Option.BUSES + f": {', '.join(request.buses)}: an outage cuts them off; give others"
         )
     return _with_confirmations(result, scenario, lambda done: report(len(outages) + done, total))
 

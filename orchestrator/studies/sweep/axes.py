@@ -18,6 +18,7 @@ from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.scenario.short_circuit import ShortCircuit
 from orchestrator.cases.settings.imperfection_tables import number_info, sets_imperfection
 from orchestrator.core.errors import InputError, few
+from orchestrator.core.options import Option
 from orchestrator.core.units import read_value, to_unit
 from orchestrator.devices.fmi.description import VariableInfo
 
@@ -107,7 +108,9 @@ def parse_vary(text: str) -> Vary:
 def resolve(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
     if vary.limits is not None and not vary.count:
         raise InputError(
-            f"--vary {vary.key}: COUNT is missing; write {_FORMS}, or search for a limit with --until"
+            Option.VARY
+            + f" {vary.key}: COUNT is missing; write {_FORMS}, or search for a limit with "
+            + Option.UNTIL
         )
     if ":" in vary.key:
         return _length_axis(vary, scenarios)
@@ -127,8 +130,11 @@ def resolve(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
     if not plans:
         names = dict.fromkeys(name for s in scenarios for name in s.system.components)
         raise InputError(
-            f"--vary {vary.key}: no component of the chosen scenarios is called {pattern!r}; "
-            f"they have: {', '.join([*names][:12])}"
+            (
+                Option.VARY
+                + f" {vary.key}: no component of the chosen scenarios is called {pattern!r}; "
+                f"they have: {', '.join([*names][:12])}"
+            )
             + whose(
                 pattern,
                 {
@@ -145,7 +151,9 @@ def resolve(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
     ]
     if len({info.unit for info in infos}) > 1:
         raise InputError(
-            f"--vary {vary.key}: the variables that fit have different units; vary them one by one"
+            Option.VARY
+            + f" {vary.key}: the variables that fit have different units; vary them one by "
+            "one"
         )
     if not infos:
         # The preparation of a point says it best, with the names that are close.
@@ -174,14 +182,14 @@ def _joint_axis(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
         }
         if not found:
             raise InputError(
-                f"--vary {part}: no parameter of the chosen scenarios fits this pattern"
+                Option.VARY + f" {part}: no parameter of the chosen scenarios fits this pattern"
             )
         keys |= found
     each = [resolve(replace(vary, key=key), scenarios) for key in keys]
     if len({axis.unit for axis in each}) > 1:
         units = ", ".join(f"{axis.key} [{axis.unit or '1'}]" for axis in each)
         raise InputError(
-            f"--vary {vary.key}: one value cannot be that of {units}; vary them one by one"
+            Option.VARY + f" {vary.key}: one value cannot be that of {units}; vary them one by one"
         )
     return replace(
         each[0], key=vary.key, title=vary.key, members=tuple((axis.key, 1.0) for axis in each)
@@ -195,8 +203,8 @@ def _length_axis(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
         return _scr_axis(vary, names, scenarios)
     if quantity != _LENGTH:
         raise InputError(
-            f"--vary {vary.key}: {quantity!r} is not known; of lines the {_LENGTH} can be multiplied, at a bus the "
-            f"{_SCR} be set"
+            Option.VARY + f" {vary.key}: {quantity!r} is not known; of lines the {_LENGTH} can be "
+            f"multiplied, at a bus the {_SCR} be set"
         )
     one = scenarios[0]
     lines = {x.name: x for x in one.network.lines if not x.has_ratio} if one.network else {}
@@ -205,7 +213,7 @@ def _length_axis(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
         found = fnmatch.filter(lines, part.rpartition(".")[2])
         if not found:
             hint = close_names(part, lines, f"there are: {few(lines, 8)}")
-            raise InputError(f"--vary {vary.key}: the network has no line {part!r}; {hint}")
+            raise InputError(Option.VARY + f" {vary.key}: the network has no line {part!r}; {hint}")
         for line in (lines[name] for name in found):
             for quantity in ("X", "R", "B") if line.B else ("X", "R"):
                 members |= _of_line(vary, scenarios, line.variable(quantity))
@@ -269,7 +277,7 @@ def _scr_axis(vary: Vary, bus: str, scenarios: Sequence[PreparedScenario]) -> Ax
         for value in axis.values:
             scale(float(value))  # one that cannot be had is refused before anything is computed
     except InputError as error:
-        raise InputError(f"--vary {vary.key}: {error}") from error
+        raise InputError(Option.VARY + f" {vary.key}: {error}") from error
     return replace(axis, members=tuple(members.items()), scale=scale)
 
 
@@ -282,7 +290,9 @@ def _of_line(vary: Vary, scenarios: Sequence[PreparedScenario], variable: str) -
     values = {scenario.system.components[grid].number(variable) for scenario in scenarios}
     if len(values) > 1:
         raise InputError(
-            f"--vary {vary.key}: {grid}.{variable} differs among the scenarios; choose one by --scenario"
+            Option.VARY
+            + f" {vary.key}: {grid}.{variable} differs among the scenarios; choose one by "
+            + Option.SCENARIO
         )
     return {f"{grid}.{variable}": values.pop()}
 
@@ -300,8 +310,11 @@ def refuse_doubles(axes: Sequence[Axis], scenarios: Sequence[PreparedScenario]) 
         if both or fnmatch.fnmatch(pattern, second) or fnmatch.fnmatch(second, pattern):
             shared = f"{both[0] if both else pattern}.{variable}"
             raise InputError(
-                f"--vary {one.key} and --vary {other.key}: both vary {shared}, which can have one value only; leave "
-                "one of them out, or give all values in one list"
+                Option.VARY
+                + f" {one.key} and "
+                + Option.VARY
+                + f" {other.key}: both vary {shared}, which can have one value only; leave one "
+                "of them out, or give all values in one list"
             )
 
 
@@ -312,7 +325,7 @@ def _imperfection_axis(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axi
     try:
         info = number_info(scenarios[0].system, tables, vary.key)
     except InputError as error:
-        raise InputError(f"--vary {error}") from error
+        raise InputError(Option.VARY + f" {error}") from error
     axis = _axis(vary, info)
     return (
         replace(axis, multiple_of=scenarios[0].step_size) if vary.key.endswith(".delay") else axis
@@ -334,9 +347,11 @@ def _axis(vary: Vary, info: VariableInfo) -> Axis:
                 convert(info, value) for value in _spaced(start, stop, vary.count, vary.logarithmic)
             ]
     except ValueError as error:
-        raise InputError(f"--vary {vary.key}: {error}") from error
+        raise InputError(Option.VARY + f" {vary.key}: {error}") from error
     if len(set(values)) < len(values):
-        raise InputError(f"--vary {vary.key}: a value stands in the list twice; leave one out")
+        raise InputError(
+            Option.VARY + f" {vary.key}: a value stands in the list twice; leave one out"
+        )
     step = 1.0 if info.type == "Integer" else None
     return Axis(
         vary.key,

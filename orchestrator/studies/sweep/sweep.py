@@ -16,6 +16,7 @@ from orchestrator.cases.questions.idle_values import Idle, idle_everywhere
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.settings.layers import joined_values
 from orchestrator.core.errors import CaseError, InputError, Problem
+from orchestrator.core.options import Option
 from orchestrator.core.truth import all_true
 from orchestrator.linear.spectra.mode_tracking import ModeSet, is_ambiguous
 from orchestrator.studies.points.points import Work
@@ -143,7 +144,13 @@ def plan_sweep(case: Case, request: SweepRequest) -> SweepPlan:
     vary, until = cast("Sequence[Vary]", request.vary), cast("Until | None", request.until)
     if not vary:
         raise InputError(
-            "nothing is varied; give --vary, such as --vary grid.X_L=0.1:0.5:9, or --scr bus_9=5:1.2:5"
+            "nothing is varied; give "
+            + Option.VARY
+            + ", such as "
+            + Option.VARY
+            + " grid.X_L=0.1:0.5:9, or "
+            + Option.SCR
+            + " bus_9=5:1.2:5"
         )
     vary = vary if until is None else [_searched(vary)]
     prepared = case.prepare(
@@ -171,12 +178,17 @@ def plan_sweep(case: Case, request: SweepRequest) -> SweepPlan:
 def _searched(vary: Sequence[Vary]) -> Vary:
     if len(vary) != 1:
         raise InputError(
-            f"--until searches along one range, and {len(vary)} are varied; give one --vary (several parameters that "
-            "move together stand in it with commas)"
+            Option.UNTIL
+            + f" searches along one range, and {len(vary)} are varied; give one "
+            + Option.VARY
+            + " (several parameters that move together stand in it with commas)"
         )
     if vary[0].limits is None:
         raise InputError(
-            f"--vary {vary[0].key}: --until needs a range such as {vary[0].key}=0.1:1.0, not a list"
+            Option.VARY
+            + f" {vary[0].key}: "
+            + Option.UNTIL
+            + f" needs a range such as {vary[0].key}=0.1:1.0, not a list"
         )
     return vary[0] if vary[0].count else replace(vary[0], count=COARSE)
 
@@ -184,7 +196,7 @@ def _searched(vary: Sequence[Vary]) -> Vary:
 def _check_end(plan: SweepPlan, varied: Mapping[str, Value]) -> list[Problem]:
     """Prepare one point of every scenario at an end of the grid. This finds parameters that cannot be varied, and those
     that cannot act, and builds FMUs that only this end needs."""
-    marks = {f"--set {key}": f"--vary {key}" for key in varied}
+    marks: dict[str, str] = {(Option.SET + f" {key}"): (Option.VARY + f" {key}") for key in varied}
     found: dict[Problem, list[str]] = {}
     idle: list[Idle] = []
     case = replace(plan.case, varied=frozenset(varied))
@@ -205,7 +217,7 @@ def _check_end(plan: SweepPlan, varied: Mapping[str, Value]) -> list[Problem]:
             else Problem(p.place, f"{p.text} (scenario {', '.join(names)})")
             for p, names in found.items()
         ]
-        raise CaseError(str(plan.case.path), wrong)
+        raise CaseError(plan.case.source, wrong)
     return [replace(p, place=marks.get(p.place, p.place)) for p in idle_everywhere(idle)]
 
 

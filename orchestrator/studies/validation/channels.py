@@ -11,6 +11,7 @@ import numpy as np
 
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.core.units import to_unit
 
 if TYPE_CHECKING:
@@ -122,8 +123,9 @@ def read_channel(text: str, columns: Iterable[str]) -> RecordedChannel:
     role, sign, rest = (part.strip() for part in text.partition("="))
     if not sign or role not in ROLES:
         raise InputError(
-            f"--channel {text}: write NAME=COLUMN with a name of {', '.join(ROLES)}, such as p=-P_total or "
-            "'angle=theta in rad'"
+            Option.CHANNEL
+            + f" {text}: write NAME=COLUMN with a name of {', '.join(ROLES)}, such as "
+            "p=-P_total or 'angle=theta in rad'"
         )
     known = list(columns)
     whole, unit = rest, ""
@@ -136,7 +138,8 @@ def read_channel(text: str, columns: Iterable[str]) -> RecordedChannel:
     column = found["column"].strip() if found else ""
     if not found or column not in known:
         raise InputError(
-            f"--channel {text}: the recording has no column {whole!r}; it has {', '.join(known)}"
+            Option.CHANNEL
+            + f" {text}: the recording has no column {whole!r}; it has {', '.join(known)}"
         )
     factor = found["factor"] or ""
     return RecordedChannel(
@@ -211,10 +214,14 @@ def _require_whole(
     said = []
     for role in lacking:
         if role in several:
-            likely = " or ".join(f"--channel '{role}={name}'" for name in several[role])
+            likely = " or ".join((Option.CHANNEL + f" '{role}={name}'") for name in several[role])
             said.append(f"{role}, the {ROLES[role]}, may be one of several: give {likely}")
         else:
-            said.append(f"{role}, the {ROLES[role]}, is missing: give --channel '{role}=COLUMN'")
+            said.append(
+                f"{role}, the {ROLES[role]}, is missing: give "
+                + Option.CHANNEL
+                + f" '{role}=COLUMN'"
+            )
     raise InputError(
         f"{label}: {'; '.join(said)}. Its columns are {', '.join(columns) or 'none'}; a table of its own names them "
         "time, v_pu, angle_deg, p_mw, q_mvar"
@@ -234,7 +241,9 @@ def in_base(
         except ValueError:
             continue
     raise InputError(
-        f"{label}: {channel.column!r} is in {unit}, and {channel.role} is the {ROLES[channel.role]}, in "
-        f"{' or '.join(_BASES[channel.role])}; give its unit, as in --channel "
-        f"'{channel.role}={channel.column} in {_BASES[channel.role][0]}'"
+        f"{label}: {channel.column!r} is in {unit}, and {channel.role} is the "
+        f"{ROLES[channel.role]}, in {' or '.join(_BASES[channel.role])}; give its "
+        "unit, as in "
+        + Option.CHANNEL
+        + f" '{channel.role}={channel.column} in {_BASES[channel.role][0]}'"
     )

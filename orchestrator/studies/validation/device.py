@@ -11,6 +11,7 @@ import numpy as np
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.devices.fmi.component import Component, RealBatch
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.devices import NO_BUS, PORT, is_controller_alone
@@ -84,8 +85,8 @@ class PlayedDevice:
         if is_controller_alone(self.description):
             raise InputError(f"{lacks}: {NO_BUS}")
         raise InputError(
-            f"{lacks}; it is driven at our port, to which a vendor.toml maps another FMU's variables: give it with "
-            "--binding (`gfor fmu bind` drafts one)"
+            f"{lacks}; it is driven at our port, to which a vendor.toml maps another "
+            "FMU's variables: give it with " + Option.BINDING + " (`gfor fmu bind` drafts one)"
         )
 
     def play(self, recording: Recording, start: OperatingStart) -> Played:
@@ -131,9 +132,13 @@ class PlayedDevice:
             low, high = info.minimum, info.maximum
             if (low is not None and found[name] < low) or (high is not None and found[name] > high):
                 raise InputError(
-                    f"{self.name}: before the event the recording has {name} = {found[name]:.4g} pu, and the device "
-                    f"takes {low} to {high}; is its rating {self.rating:g} MVA (--set S_n=…), and are the recording's "
-                    "units as gfor reads them (--channel)?"
+                    f"{self.name}: before the event the recording has {name} = {found[name]:.4g} "
+                    f"pu, and the device takes {low} to {high}; is its rating {self.rating:g} MVA "
+                    "("
+                    + Option.SET
+                    + " S_n=…), and are the recording's units as gfor reads them ("
+                    + Option.CHANNEL
+                    + ")?"
                 )
         return {name: value for name, value in found.items() if name in self.description.variables}
 

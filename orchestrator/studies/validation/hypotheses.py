@@ -13,6 +13,7 @@ import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.core.errors import CosimError
+from orchestrator.core.options import Option
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import (
     EventComparison,
@@ -193,7 +194,9 @@ def sign_that_starts(device: PlayedDevice, event: RecordedEvent, bases: PortBase
     near = cut_event(event, _AFTER, _BEFORE)
     for reading in READINGS_OF_SIGN:
         if reading.fits(event.recording) and [*_error_left(device, near, reading, bases)]:
-            typed = " ".join(f"--channel '{one}'" for one in reading.remedy(event.recording))
+            typed = " ".join(
+                (Option.CHANNEL + f" '{one}'") for one in reading.remedy(event.recording)
+            )
             return f"P is {before:.3g} pu before the event; if {reading.name}, give {typed}: so the device starts"
     return ""
 

@@ -11,6 +11,7 @@ from typing import Any, Literal
 from pydantic import Field, ValidationError
 
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.core.toml_files import Table, fault_of, read_toml
 from orchestrator.studies.validation.event import EventComparison
 from orchestrator.studies.validation.figures import ErrorFigures, modes_apart
@@ -89,15 +90,16 @@ def read_limits(path: Path) -> LimitTables:
     """Read a file of limits.
 
     Raises an `InputError` if it is no such file, or a key or value in it cannot be used."""
-    _, table = read_toml(path, "the file of limits", f"{EXAMPLE} is an example", "--limits")
+    _, table = read_toml(path, "the file of limits", f"{EXAMPLE} is an example", Option.LIMITS)
     try:
         found = LimitTables.model_validate(table)
     except ValidationError as error:
         said = [f"{'.'.join(map(str, one['loc']))}: {fault_of(one)}" for one in error.errors()]
-        raise InputError(f"--limits {path}: {'; '.join(said)}") from error
+        raise InputError(Option.LIMITS + f" {path}: {'; '.join(said)}") from error
     if not (found.windows or found.delay or found.ring_down):
         raise InputError(
-            f"--limits {path}: it has no limit; write one such as [windows.after.p] with max_error = 0.1"
+            Option.LIMITS + f" {path}: it has no limit; write one such as [windows.after.p] with "
+            "max_error = 0.1"
         )
     return found
 

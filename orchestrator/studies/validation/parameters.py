@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from orchestrator.cases.form.names import close_names
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.devices.fmi.description import VariableInfo
 from orchestrator.studies.validation.device import PlayedDevice
 
@@ -74,14 +75,20 @@ def wanted_parameters(
         if not fitting:
             hint = close_names(pattern, list(known))
             raise InputError(
-                f"--fit {given}: {device.name} has no parameter of that name that can be fitted; "
+                Option.FIT
+                + f" {given}: {device.name} has no parameter of that name that can be fitted; "
                 f"{hint or '`gfor fmu info` lists them'}"
             )
         chosen |= fitting
     own = {_own_name(device, name, known): of for name, of in bounds.items()}
     strange = [name for name in bounds if _own_name(device, name, known) not in chosen]
     if strange:
-        raise InputError(f"--bounds {strange[0]}: it is not fitted; name it with --fit as well")
+        raise InputError(
+            Option.BOUNDS
+            + f" {strange[0]}: it is not fitted; name it with "
+            + Option.FIT
+            + " as well"
+        )
     numbers = [
         adjustable(device, info, own.get(name))
         for name, info in chosen.items()
@@ -106,8 +113,9 @@ def adjustable(
     if bounds is not None:
         if not low <= bounds[0] < bounds[1] <= high:
             raise InputError(
-                f"--bounds {info.name}={bounds[0]:g}:{bounds[1]:g}: the device declares {low:g} to {high:g}; give "
-                "bounds within these, the lower one first"
+                Option.BOUNDS
+                + f" {info.name}={bounds[0]:g}:{bounds[1]:g}: the device declares {low:g} to "
+                f"{high:g}; give bounds within these, the lower one first"
             )
         low, high = bounds
         value = min(max(value, low), high)

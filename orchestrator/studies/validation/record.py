@@ -13,6 +13,7 @@ import numpy as np
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.studies.validation.averaging import averaged
 from orchestrator.studies.validation.channels import RecordedChannel, channels_in, in_base, unit_of
 from orchestrator.studies.validation.filled import Mask, filled_samples, runs_of
@@ -175,7 +176,9 @@ def _of_run(dataset: xr.Dataset, place: str | None, label: str) -> xr.Dataset:
     if place is None or place not in buses:
         known = ", ".join(buses) or "none: run it with 'record = [\"*\"]'"
         raise InputError(
-            f"{label}: it is a run with several units; give --place with one of {known}"
+            f"{label}: it is a run with several units; give "
+            + Option.PLACE
+            + f" with one of {known}"
         )
 
     def phasor(name: str, what: str) -> Complex:
@@ -324,14 +327,14 @@ class _Reading:
         typical = float(np.nanmedian(np.abs(values)))
         if not base and not 0.3 < typical < 1.6:
             raise InputError(
-                f"{self.label}: {channel.column!r} says no unit, and is about {typical:.4g}; give it, as in --channel "
-                f"'{channel.changed(unit='kV')}'"
+                f"{self.label}: {channel.column!r} says no unit, and is about {typical:.4g}; "
+                "give it, as in " + Option.CHANNEL + f" '{channel.changed(unit='kV')}'"
             )
         if base == "kV" and self.bases.kilovolt is None:
             near = min(_VOLTAGES_KV, key=lambda kV: abs(math.log(kV * peak / max(typical, 1e-9))))
             raise InputError(
-                f"{self.label}: {channel.column!r} is in kV; give the rated voltage between lines, as in --voltage "
-                f"'{near:g} kV', the nearest usual one"
+                f"{self.label}: {channel.column!r} is in kV; give the rated voltage between "
+                "lines, as in " + Option.VOLTAGE + f" '{near:g} kV', the nearest usual one"
             )
         return (
             values / (self.bases.kilovolt * peak)
@@ -344,8 +347,8 @@ class _Reading:
         values, base = self._values(role)
         if base == "kA" and self.bases.kilovolt is None:
             raise InputError(
-                f"{self.label}: {self.channels[role].column!r} is in kA; give the rated voltage between lines, as in "
-                "--voltage '400 kV'"
+                f"{self.label}: {self.channels[role].column!r} is in kA; give the rated "
+                "voltage between lines, as in " + Option.VOLTAGE + " '400 kV'"
             )
         if base == "kA" and self.bases.kilovolt:
             return values / (peak * self.bases.rating / (math.sqrt(3) * self.bases.kilovolt))
@@ -357,8 +360,9 @@ class _Reading:
         unit = "MW" if role == "p" else "Mvar"
         if not base:
             raise InputError(
-                f"{self.label}: {channel.column!r} says no unit; give it, as in --channel "
-                f"'{channel.changed(unit=unit)}', or in pu, which is of the rating"
+                f"{self.label}: {channel.column!r} says no unit; give it, as in "
+                + Option.CHANNEL
+                + f" '{channel.changed(unit=unit)}', or in pu, which is of the rating"
             )
         return values if base == "pu" else values / self.bases.rating
 
@@ -372,8 +376,11 @@ class _Reading:
         raw = np.asarray(self.dataset[channel.column].values, dtype=float)
         if not base:
             raise InputError(
-                f"{self.label}: {channel.column!r} says no unit; give it: --channel '{channel.changed(unit='deg')}', "
-                f"or --channel '{channel.changed(unit='rad')}'"
+                f"{self.label}: {channel.column!r} says no unit; give it: "
+                + Option.CHANNEL
+                + f" '{channel.changed(unit='deg')}', or "
+                + Option.CHANNEL
+                + f" '{channel.changed(unit='rad')}'"
             )
         self._ask_of_wraps(raw, angle, channel)
         known = np.isfinite(angle)
@@ -529,8 +536,9 @@ def _longest_gap(label: str, times: Numbers, interval: float) -> float:
     if longest > max(_LONGEST_GAP, 3 * interval):
         at = float(times[int(gaps.argmax())])
         raise InputError(
-            f"{label}: samples of the voltage are missing, or hold the last value, for {longest:.3g} s from {at:g} s "
-            "on; what drives the device there is not known. Give a part of the recording, with --start and --stop"
+            f"{label}: samples of the voltage are missing, or hold the last value, for "
+            f"{longest:.3g} s from {at:g} s on; what drives the device there is not "
+            "known. Give a part of the recording, with " + Option.START + " and " + Option.STOP
         )
     return longest
 

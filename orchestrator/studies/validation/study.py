@@ -9,6 +9,7 @@ from typing import Any
 
 from orchestrator.core.errors import CosimError, InputError
 from orchestrator.core.late import xr
+from orchestrator.core.options import Option
 from orchestrator.studies.validation.beside import WindowApart, models_apart
 from orchestrator.studies.validation.between import with_doubt_between
 from orchestrator.studies.validation.causes import Explanation
@@ -109,8 +110,9 @@ def events_of(request: ValidationRequest) -> list[RecordedEvent]:
     given = list(request.events)
     if len(given) not in (0, 1, len(request.recordings)):
         raise InputError(
-            f"--event: {len(given)} are given for {len(request.recordings)} recordings; give one for all, or one for "
-            "each in their order"
+            Option.EVENT
+            + f": {len(given)} are given for {len(request.recordings)} recordings; give one "
+            "for all, or one for each in their order"
         )
     each: Sequence[tuple[float, float] | None]
     alone = given[0] if given else None
@@ -163,8 +165,9 @@ def _others(
     device.check_port()
     if not math.isclose(device.rating, request.device.rating, rel_tol=1e-9):
         raise InputError(
-            f"--beside {device.name}: its rating is {device.rating:g} MVA, and that of {request.device.name} is "
-            f"{request.device.rating:g} MVA; give both the plant's, with --set S_n=…"
+            Option.BESIDE + f" {device.name}: its rating is {device.rating:g} MVA, and that of "
+            f"{request.device.name} is {request.device.rating:g} MVA; give both the "
+            "plant's, with " + Option.SET + " S_n=…"
         )
     found = []
     for event in events:
@@ -176,7 +179,9 @@ def _others(
 def _find_wanted(request: ValidationRequest) -> Wanted:
     """Find the parameters that are fitted; refuse a fit that no recording is left to."""
     if all(given.held_back for given in request.recordings):
-        raise InputError("--hold-back: all recordings are kept back from the fit; leave one to it")
+        raise InputError(
+            Option.HOLD_BACK + ": all recordings are kept back from the fit; leave one to it"
+        )
     return wanted_parameters(request.device, request.fit, request.bounds)
 
 

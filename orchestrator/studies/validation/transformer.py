@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 
 _PART = re.compile(r"([RX])\s*=?\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?:pu)?[\s,;]*", re.IGNORECASE)
 _ALONE = re.compile(r"\s+of\s+(V|PQ)\s*$", re.IGNORECASE)
@@ -46,9 +47,10 @@ def read_transformer(text: str | None) -> Between:
     rest = _PART.sub("", parts).strip()
     if rest or not found or len(set(names)) < len(names):
         raise InputError(
-            f"--transformer {text!r}: write its reactance in pu of the rating, and perhaps its resistance, such as "
-            "'X 0.12' or 'R 0.005 X 0.12'; 'X 0.12 of V' if the voltage alone is measured beyond it, 'X 0.12 of PQ' if "
-            "P and Q alone are"
+            Option.TRANSFORMER
+            + f" {text!r}: write its reactance in pu of the rating, and perhaps its "
+            "resistance, such as 'X 0.12' or 'R 0.005 X 0.12'; 'X 0.12 of V' if the "
+            "voltage alone is measured beyond it, 'X 0.12 of PQ' if P and Q alone are"
         )
     values = dict(zip(names, (float(value) for _, value in found), strict=True))
     return Between(complex(values.get("R", 0.0), values.get("X", 0.0)), beyond)

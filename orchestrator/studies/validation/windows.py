@@ -8,6 +8,7 @@ import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.studies.validation.filled import Mask
 from orchestrator.studies.validation.record import Recording
 
@@ -70,8 +71,9 @@ def given_windows(recording: Recording, begin: float, end: float) -> Windows:
     if not 0 < low < high < recording.length:
         last = recording.begin + recording.length
         raise InputError(
-            f"--event {begin:g}:{end:g}: {recording.label} lasts from {recording.begin:g} to {last:g} s; give begin "
-            "and end of the event within it"
+            Option.EVENT
+            + f" {begin:g}:{end:g}: {recording.label} lasts from {recording.begin:g} to "
+            f"{last:g} s; give begin and end of the event within it"
         )
     return Windows(low, high, recording.length, chosen=True)
 

@@ -8,6 +8,7 @@ import pytest
 import orchestrator as gfor
 from orchestrator.cases.forcing import event_of
 from orchestrator.core.errors import CaseError, InputError
+from orchestrator.core.options import Option
 from orchestrator.systems.coupling.events import Forcing
 
 
@@ -46,10 +47,10 @@ def test_a_frequency_near_the_step_asks_for_each_point_once():
 
 
 def test_the_words_of_the_command():
-    table = event_of("force", "sg35.exciter.V_ref  800 mHz 2% square from 500 ms")
+    table = event_of(Option.FORCE, "sg35.exciter.V_ref  800 mHz 2% square from 500 ms")
     assert (table.component, table.reference, table.shape) == ("sg35", "exciter.V_ref", "square")
     assert (table.frequency, table.amplitude, table.time) == pytest.approx((0.8, 0.02, 0.5))
-    assert event_of("force", "gfor 0.8 Hz 0.05 pu").amplitude == 0.05
+    assert event_of(Option.FORCE, "gfor 0.8 Hz 0.05 pu").amplitude == 0.05
 
 
 @pytest.mark.parametrize(
@@ -57,7 +58,7 @@ def test_the_words_of_the_command():
 )
 def test_other_words_are_refused_with_the_form(text):
     with pytest.raises(InputError, match="UNIT FREQUENCY AMPLITUDE"):
-        event_of("force", text)
+        event_of(Option.FORCE, text)
 
 
 @pytest.mark.parametrize(
@@ -182,7 +183,7 @@ def test_the_run_tells_who_was_forced(run):
     ],
 )
 def test_a_fault_in_words(text, given):
-    fault = event_of("fault", text)
+    fault = event_of(Option.FAULT, text)
     assert (fault.bus, fault.time, fault.duration, fault.cleared_by) == given
 
 
@@ -191,7 +192,7 @@ def test_a_fault_in_words(text, given):
 )
 def test_a_fault_without_its_parts_is_refused(text):
     with pytest.raises(InputError, match=f"^--fault '{text}': "):
-        event_of("fault", text)
+        event_of(Option.FAULT, text)
 
 
 def test_a_fault_takes_the_place_of_all_events():

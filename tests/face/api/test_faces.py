@@ -1,5 +1,6 @@
 """An object's own face: its truth value, what a notebook shows of it, and what its errors say to Python."""
 
+import ast
 import re
 import subprocess
 import sys
@@ -13,7 +14,8 @@ import pandas as pd
 import pytest
 
 import orchestrator as gfor
-from orchestrator.core.spelling import _CALLS, spelled
+from orchestrator.core.options import Option, command
+from orchestrator.core.spelling import spelled
 from orchestrator.linear.spectra.stability import Stability
 
 ROOT = Path(__file__).parents[3]
@@ -128,20 +130,34 @@ def test_a_table_from_python_looks_beside_the_working_folder(case, tmp_path, mon
         case.with_(components={"x": {"fmu": "MyPss.fmu"}}).scenario("gfor")
 
 
+def quoted_commands():
+    """Every command that a text of the program quotes as a value, with the file that it stands in."""
+    for path in (ROOT / "orchestrator").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.Call) and ast.unparse(node.func) == "command":
+                words, *options = node.args
+                given = [
+                    (Option[one.elts[0].attr], "1")
+                    if isinstance(one, ast.Tuple)
+                    else Option[one.attr]
+                    for one in options
+                ]
+                yield path.name, command(words.value, *given)
+
+
 def test_advice_in_python_names_what_exists():
     """Every command that a text quotes is spelt for Python as a call with keywords that there are."""
+    calls = [(name, re.fullmatch(r"`(\w+)\((.*)\)`", spelled(c))) for name, c in quoted_commands()]
     wrong = []
-    for path in (ROOT / "orchestrator").rglob("*.py"):
-        for quoted in re.findall(r"(?<!`)`gfor [^`\n]*--[^`\n]*`(?!`)", path.read_text("utf-8")):
-            call = re.fullmatch(r"`(\w+)\((.*)\)`", spelled(quoted))
-            if call is None:
-                continue
-            assert call[1] in _CALLS
-            keywords = re.findall(r"(\w+)=", call[2])
-            found = [getattr(one, call[1]) for one in OWNERS if hasattr(one, call[1])]
-            if not any({*keywords} <= {*signature(one).parameters} for one in found):
-                wrong.append(f"{path.name}: {quoted} → {call[0]}")
+    for name, call in calls:
+        if call is None:
+            continue
+        keywords = re.findall(r"(\w+)=", call[2])
+        found = [getattr(one, call[1]) for one in OWNERS if hasattr(one, call[1])]
+        if not any({*keywords} <= {*signature(one).parameters} for one in found):
+            wrong.append(f"{name}: {call[0]}")
     assert not wrong, "\n".join(wrong)
+    assert len([call for _, call in calls if call]) > 5
 
 
 SCRIPT = """

@@ -6,6 +6,7 @@ import pytest
 
 from orchestrator.core import spelling
 from orchestrator.core.errors import InputError, Problem
+from orchestrator.core.options import Option
 from orchestrator.studies.points import task as points
 from orchestrator.studies.points.failure import failure_kept
 
@@ -44,7 +45,8 @@ def test_texts_of_a_point_name_options_as_they_are_typed_whoever_computes_it(mon
     """A worker process has not begun as a command, and its texts are shown by one."""
     monkeypatch.setattr(spelling, "_commanded", [])
     monkeypatch.setattr(points, "same_case", lambda *wanted: None)
-    question = Problem("own.raw", "write `gfor new --reactive-limits`, or --set grid.X=1")
+    text = "write `gfor new --reactive-limits`, or " + Option.SET + " grid.X=1"
+    question = Problem("own.raw", text)
     asked = SimpleNamespace(study=SimpleNamespace(reference="", fingerprint="", trust_fmus=False))
     asked.study.varied = frozenset()
     assert points.computed(asked, lambda task, case: str(question)) == (

@@ -37,6 +37,7 @@ from orchestrator.cases.networks.psse.raw_network import Machine, unit_labels
 from orchestrator.cases.networks.psse.record_doubts import doubts_of_machine
 from orchestrator.cases.networks.psse.record_values import values_of_record
 from orchestrator.core.errors import InputError, first_of
+from orchestrator.core.options import Option
 
 _MOST_SHOWN = 20
 
@@ -129,7 +130,7 @@ def machine_models(
     problems = [*(slips(strange) if bare else ()), *problems, *unfit]
     if problems or missing:
         counted_once = [*count_repeats(problems, first)]
-        listed = first_of(counted_once, _MOST_SHOWN, "gfor new lists all with --details")
+        listed = first_of(counted_once, _MOST_SHOWN, ("gfor new lists all with " + Option.DETAILS))
         shown = [*in_words(missing, labels), *listed]
         raise InputError(
             "the dynamics data cannot be taken over; correct them, or name models that may go in [units] "

@@ -24,6 +24,7 @@ from orchestrator.cases.networks.psse.solution import (
     sort_buses,
     stated_voltages,
 )
+from orchestrator.core.options import Option
 
 _NO_LIMIT = 9999.0  # MW or Mvar by which PSS/E says that a generator has no limit
 _APART = 0.01  # voltage of a file beside what a generator within its limits is to hold [pu]
@@ -97,8 +98,10 @@ def _setpoint(
         if is_within:
             text = f"VS is {held:g} pu, where the solved file has VM = {VM:g} pu, with Q within its limits"
         text += (
-            ": it holds VM, from which PSS/E starts as well, where ANDES holds VS; the unit's v_0 (in "
-            "[components.sg….parameters], also as --set sg….v_0=VS) changes it"
+            ": it holds VM, from which PSS/E starts as well, where ANDES holds VS; the "
+            "unit's v_0 (in [components.sg….parameters], also as "
+            + Option.SET
+            + " sg….v_0=VS) changes it"
         )
         net.changes.note(record.line, text)
         return VM

@@ -15,6 +15,7 @@ from orchestrator.cases.networks.psse.motor_loads import MOTOR_NAMES
 from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
 from orchestrator.cases.networks.source_changes import Changes
 from orchestrator.core.errors import Problem, counted, few
+from orchestrator.core.options import Option
 
 _MATTER = {
     "load": "loads follow [network] load_model",
@@ -106,9 +107,14 @@ def _strays(records: Sequence[DynamicRecord], unused: Sequence[DynamicRecord]) -
     ]
     yield Problem(
         strays[0].place,
-        f"{counted(len(strays), 'record')} of {counted(len(places), 'machine')} that the RAW file does not have "
-        f"({few(named, _MOST_BUSES, '; ')}; first {strays[0].name}) are passed over, as PSS/E does; --details "
-        "lists them; if one is meant for a machine of the RAW file, correct its bus or identifier",
+        (
+            f"{counted(len(strays), 'record')} of {counted(len(places), 'machine')} that "
+            f"the RAW file does not have ({few(named, _MOST_BUSES, '; ')}; first "
+            f"{strays[0].name}) are passed over, as PSS/E does; "
+            + Option.DETAILS
+            + " lists them; if one is meant for a machine of the RAW file, correct its bus "
+            "or identifier"
+        ),
     )
 
 

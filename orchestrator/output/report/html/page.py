@@ -10,6 +10,7 @@ from typing import Any
 
 from orchestrator.cases.networks.element_names import ElementNames
 from orchestrator.core.errors import InputError, few
+from orchestrator.core.options import Option
 from orchestrator.core.safe_files import file_hash, write_page
 from orchestrator.output.report.html import sections, studies
 from orchestrator.output.report.html.chapters.chapter import Chapter
@@ -340,11 +341,12 @@ def _kept_answers(page: Path) -> list[Answer]:
         kept: list[Answer] | None = json.loads(found[1]) if found else None
     except (OSError, ValueError) as error:
         raise InputError(
-            f"--against {page}: it cannot be read: {error}; give a page of `gfor report`"
+            Option.AGAINST + f" {page}: it cannot be read: {error}; give a page of `gfor report`"
         ) from error
     if kept is None:
         raise InputError(
-            f"--against {page}: it is no page of `gfor report`; give one that an earlier call wrote"
+            Option.AGAINST
+            + f" {page}: it is no page of `gfor report`; give one that an earlier call wrote"
         )
     return kept
 

@@ -11,6 +11,7 @@ from typing import Any, Generic, TypeVar
 
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.studies.certification.codes.measured import MeasuredRow
 from orchestrator.studies.certification.codes.programme import BenchProgramme
 
@@ -33,14 +34,20 @@ def checked(
     unknown = [name for name in given if name not in names]
     if unknown:
         takes = f"it takes {', '.join(names)}" if names else "it takes none; leave it out"
-        raise InputError(f"--declare {unknown[0]}: --code {code} knows no such value; {takes}")
+        raise InputError(
+            Option.DECLARE
+            + f" {unknown[0]}: "
+            + Option.CODE
+            + f" {code} knows no such value; {takes}"
+        )
     missing = [d for d in wanted if d.name not in given]
     if missing:
         said = "; ".join(f"{d.name} ({d.meaning}) [{d.unit}]" for d in missing)
-        example = " ".join(f"--declare {d.name}=…" for d in missing)
+        example = " ".join((Option.DECLARE + f" {d.name}=…") for d in missing)
         raise InputError(
-            f"--code {code} compares the converter with what is declared of it; missing: {said}. "
-            f"Add {example}"
+            Option.CODE
+            + f" {code} compares the converter with what is declared of it; missing: {said}"
+            f". Add {example}"
         )
     values = {}
     for declaration in wanted:
@@ -52,8 +59,10 @@ def checked(
         )
         if not declaration.least <= number <= declaration.most:
             raise InputError(
-                f"--declare {declaration.name}={value}: the {declaration.meaning} is a number from "
-                f"{declaration.least:g} to {declaration.most:g} [{declaration.unit}]; give it so"
+                Option.DECLARE
+                + f" {declaration.name}={value}: the {declaration.meaning} is a number from "
+                f"{declaration.least:g} to {declaration.most:g} [{declaration.unit}]; give it "
+                "so"
             )
         values[declaration.name] = float(number)
     return values

@@ -12,6 +12,7 @@ from typing import TypeVar
 from orchestrator.cases.case import load_case
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
+from orchestrator.core.options import Option
 from orchestrator.devices.fmi.description import VariableInfo
 from orchestrator.studies.certification.certificate import Certificate
 from orchestrator.studies.certification.codes import change_point
@@ -100,9 +101,12 @@ def plan_changes(
     chosen = [p for p in asked if p.variable not in (*given, *unknown)]
     if not chosen:
         raise InputError(
-            f"--sensitivities: {certificate.request.fmu} has no {'such' if patterns else 'tunable'} "
-            "parameter that the rows do not give it themselves; name one by --parameter, or take the "
-            "fixed ones too by --fixed"
+            Option.SENSITIVITIES
+            + f": {certificate.request.fmu} has no {'such' if patterns else 'tunable'} "
+            "parameter that the rows do not give it themselves; name one by "
+            + Option.PARAMETER
+            + ", or take the fixed ones too by "
+            + Option.FIXED
         )
     every = [info for info in plan.description.variables.values() if info.causality == "parameter"]
     names = {p.variable for p in chosen}
