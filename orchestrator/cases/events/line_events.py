@@ -6,10 +6,11 @@ from dataclasses import replace
 from fmus.grid.element_data import Line
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.form import schema
+from orchestrator.core.options import Option
 from orchestrator.systems.coupling import events as coupled
 from orchestrator.systems.coupling.events import Event
 
-_REMEDY = 'write models = "phasor" at the top of the case, or --set models=phasor'
+_REMEDY = 'write models = "phasor" at the top of the case, or ' + Option.SET + " models=phasor"
 
 
 def line_events(
@@ -19,7 +20,8 @@ def line_events(
     for what in _beyond_transients(table):
         if not _is_of_phasors(draft, grid):
             draft.note(
-                where, f"{what} needs a network of phasors, and {grid!r} has transients; {_REMEDY}"
+                where,
+                f"{what} needs a network of phasors, and {grid!r} has transients; " + _REMEDY,
             )
             return []
     match table:
