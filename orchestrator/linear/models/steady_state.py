@@ -144,9 +144,8 @@ def _beside_stores(
     changes = f"{_newton_in_words(found.iterations)} a communication step changes {worst}, more than {tolerance:g}"
     if reason:
         raise AnalysisError(
-            f"no steady state found: {reason}, so that it is no store which could be held; `gfor run` simulates it, and "
-            + command("modes CASE", Option.BLACK_BOX)
-            + " measures its component as it is",
+            f"no steady state found: {reason}, so that it is no store which could be held; `gfor run` simulates it, "
+            "and " + command("modes CASE", Option.BLACK_BOX) + " measures its component as it is",
             kind=ErrorKind.STEADY_STATE,
         )
     present = described(master.system.wires)
