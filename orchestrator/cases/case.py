@@ -55,6 +55,7 @@ _SOURCES = {
     ".raw": ("a network of PSS/E", "network", "raw"),
     ".rawx": ("a network of PSS/E", "network", "raw"),
     ".dyr": ("dynamics data of PSS/E", "units", "dyr"),
+    ".seq": ("sequence data of PSS/E", "network", "seq"),
     ".m": ("a MATPOWER case", "network", "matpower"),
     ".mat": ("a MATPOWER case", "network", "matpower"),
     ".zip": ("an archive, perhaps a CGMES model", "network", "cgmes"),

@@ -58,7 +58,10 @@ def _without_unit(
     ends = [
         (line.from_bus, line.to_bus)
         for line in network.lines
-        if values.get(line.variable("connected"), True)
+        if all(
+            values.get(line.variable(switch), True)
+            for switch in ("connected", "from_connected", "to_connected")
+        )
     ]
     for winding in network.transformers:
         if values.get(f"{winding.name}.connected", True):

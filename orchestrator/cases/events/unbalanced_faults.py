@@ -96,13 +96,13 @@ class _Solver:
         self._where = self._where or where
         match event:
             case coupled.BusFault():
-                found = self._assembled(values, Changed(), event.kind)
+                found = self._assembled(values, Changed(), event.kind, event.bus)
                 negative, zero = (x.impedance(event.bus) for x in (found.negative, found.zero))
                 z = _met(event.kind, complex(event.R, event.X), negative, zero)
                 self._keep(event, event.bus, event.kind, (negative, zero, z), found)
                 return replace(event, R=z.real, X=z.imag)
             case coupled.LineFault():
-                found = self._assembled(values, Changed(event.line, event.at), event.kind)
+                found = self._assembled(values, Changed(event.line, event.at), event.kind, FAULT)
                 negative, zero = (x.impedance(FAULT) for x in (found.negative, found.zero))
                 z = _met(event.kind, complex(event.R, event.X), negative, zero)
                 place = f"{event.line}, {100 * event.at:g} %"
@@ -113,9 +113,10 @@ class _Solver:
         return event
 
     def _open_pole(self, event: coupled.PoleSwitching, values: Mapping[str, object]) -> Event:
-        found = self._assembled(values, Changed(event.line), "1-phase")
-        network = found.network
+        network = self._draft.network
+        assert network is not None
         line = next(x for x in network.lines if x.name == event.line)
+        found = self._assembled(values, Changed(event.line), "1-phase", line.from_bus)
         own = found.series(event.line)
         negative, zero = (
             z + x.between(line.from_bus, line.to_bus)
@@ -128,11 +129,15 @@ class _Solver:
         return replace(event, R=own[0].real + z.real, X=own[0].imag + line.X_C + z.imag)
 
     def _assembled(
-        self, values: Mapping[str, object], changed: Changed, kind: FaultKind
+        self, values: Mapping[str, object], changed: Changed, kind: FaultKind, place: str
     ) -> SequenceAssembly:
+        """Return both networks, and keep what was taken by a default and counts at a place."""
         found = SequenceAssembly(self._draft, self._flow, dict(values), changed)
         self._turned += [name for name in found.turned if name not in self._turned]
-        for key, names in found.assumed.items():
+        near = {*found.zero.part_of(place)}
+        away = {port.name for port in found.network.ports if port.bus not in near}
+        for key, all_names in found.assumed.items():
+            names = [x for x in all_names if key != "machine_x0" or x not in away]
             if kind == "2-phase" and key not in _ONLY_NEGATIVE:
                 continue
             known = self._assumed.setdefault(key, [])
@@ -194,6 +199,8 @@ class _Solver:
             )
             yield Problem(self._where, text, topic=QuestionTopic("exchanged sides", name))
         for key, names in self._assumed.items():
+            if not names:
+                continue
             said = _EXAMPLES[key].format(names[0])
             text = (
                 f"{_ASSUMED[key]} ({counted(len(names), 'element')}: {few(names, _SHOWN)}); if it is another, give "

@@ -75,7 +75,7 @@ class SequenceNetwork:
 
     def impedance(self, bus: str) -> complex:
         """Return the impedance from a bus to earth [pu, 100 MVA]; `NO_PATH` where none leads there."""
-        part = self._part_of(bus)
+        part = self.part_of(bus)
         if not self._earthed & set(part):
             return NO_PATH
         place, factors = self._factors(part)
@@ -83,7 +83,7 @@ class SequenceNetwork:
 
     def between(self, one: str, other: str) -> complex:
         """Return the impedance between two buses [pu, 100 MVA]; `NO_PATH` where nothing joins them, earth included."""
-        part = self._part_of(one)
+        part = self.part_of(one)
         if other not in part:
             return self.impedance(one) + self.impedance(other)
         held = () if self._earthed & set(part) else (other,)
@@ -96,7 +96,7 @@ class SequenceNetwork:
         self._entries[row, column] = self._entries.get((row, column), 0j) + y
         self._solved.clear()
 
-    def _part_of(self, bus: str) -> list[str]:
+    def part_of(self, bus: str) -> list[str]:
         """Return the buses that branches join with one."""
         parts = connected_parts(self.buses, self._ends)
         return [other for other in self.buses if parts[other] == parts[bus]]

@@ -31,6 +31,7 @@ class SolvedFault:
             "place": self.place,
             "kind": self.kind,
             "source": self.source,
+            "words": self.in_words,
             **{k: None if z is None else [z.real, z.imag] for k, z in parts.items()},
         }
 

@@ -143,7 +143,7 @@ class CaseText:
     @property
     def text(self) -> str:
         w, places = self._wanted, self._places
-        key = next(key for key in self._sources if key not in ("dyr", "units"))
+        key = next(key for key in self._sources if key not in ("dyr", "seq", "units"))
         kind, other = w.kind, "phasor" if w.kind == "emt" else "emt"
         steps = {"emt": "100 us", "phasor": "2 ms"}
         stray = {
@@ -184,7 +184,8 @@ class CaseText:
             + "\nmove_controls = true        # taps and switched shunts move after an outage"
             * w.move_controls,
             loads="" if self._tables() else "# ",
-            more=(f"frequency = {_quoted(w.frequency)}\n" if w.frequency else "")
+            more=self._sequences()
+            + (f"frequency = {_quoted(w.frequency)}\n" if w.frequency else "")
             + stray["emt"] * (kind == "emt")
             + (f"leave_out = {_toml_list(w.leave_out)}\n" if w.leave_out else ""),
             units=dyr
@@ -198,6 +199,13 @@ class CaseText:
                 "\n".join([*block, ""]) for block in [*self._scenarios(), *self._plots()]
             ),
         )
+
+    def _sequences(self) -> str:
+        """The line that names the file of the negative and the zero sequence."""
+        if "seq" not in self._sources:
+            return ""
+        path = self._path(self._sources["seq"])
+        return f"seq = {path}    # for faults of fewer than three phases\n"
 
     def _tables(self) -> str:
         tables = [

@@ -24,14 +24,18 @@ _FILES = {
     ".zip": "cgmes",
 }
 
+_BESIDE = {".dyr": "dyr", ".seq": "seq"}
+"""Files that go with a RAW file: dynamics data, and those of the negative and the zero sequence."""
+
 
 def sources_of(files: Sequence[Path]) -> dict[str, Path]:
     """Key of the case file that names it → file."""
     found: dict[str, Path] = {}
+    beside = {*_BESIDE.values()}
     for path in files:
         suffix = path.suffix.lower()
-        known = ", ".join([*_FILES, ".dyr", ".csv"])
-        if not path.is_dir() and suffix not in (*_FILES, ".dyr", ".csv"):
+        known = ", ".join([*_FILES, *_BESIDE, ".csv"])
+        if not path.is_dir() and suffix not in (*_FILES, *_BESIDE, ".csv"):
             raise InputError(
                 f"{path}: no network that is read; give a file {known}, or the folder of a CGMES model"
             )
@@ -39,13 +43,14 @@ def sources_of(files: Sequence[Path]) -> dict[str, Path]:
             near = close_names(path.name, [p.name for p in path.absolute().parent.glob("*")])
             raise InputError(f"{path}: there is no such file{f'; {near}' if near else ''}")
         key = _key_of(path)
-        others = [k for k in found if "dyr" not in (k, key) and not {k, key} <= {*_TABLES}]
+        pairs = ((k, {k, key}) for k in found)
+        others = [k for k, pair in pairs if not (pair & beside or pair <= {*_TABLES})]
         if key in found or others:
             raise InputError(
                 f"{path} and {found.get(key) or found[others[0]]}: a case has one of them; give one"
             )
         found[key] = path
-    if not [key for key in found if key != "dyr"]:
+    if not found.keys() - beside:
         raise InputError("no network is given; name its file, such as own.raw, and with it own.dyr")
     lacks = [key for key in ("lines_file", "units") if key not in found]
     if {*found} & {*_TABLES} and lacks:
@@ -53,10 +58,11 @@ def sources_of(files: Sequence[Path]) -> dict[str, Path]:
         raise InputError(
             f"{', '.join(map(str, found.values()))}: of the tables of a network, {wanted} is missing"
         )
-    if "dyr" in found and "raw" not in found:
-        raise InputError(
-            f"{found['dyr']}: dynamics data of PSS/E need the network's RAW file; give both"
-        )
+    for key, what in (("dyr", "dynamics"), ("seq", "sequence")):
+        if key in found and "raw" not in found:
+            raise InputError(
+                f"{found[key]}: {what} data of PSS/E need the network's RAW file; give both"
+            )
     return found
 
 
@@ -65,7 +71,7 @@ def _key_of(path: Path) -> str:
     suffix = path.suffix.lower()
     if path.is_dir():
         return "cgmes"
-    return "dyr" if suffix == ".dyr" else _FILES.get(suffix) or _table_of(path)
+    return _BESIDE.get(suffix) or _FILES.get(suffix) or _table_of(path)
 
 
 def _table_of(path: Path) -> str:

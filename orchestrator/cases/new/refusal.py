@@ -59,7 +59,7 @@ def _move_place(
         return problem  # at a value of a file already
     table, key = found[1], found[2] or ""
     option = _option(table, key, options)
-    network = next(path.name for key, path in sources.items() if key != "dyr")
+    network = next(path.name for key, path in sources.items() if key not in ("dyr", "seq"))
     dynamics = sources["dyr"].name if "dyr" in sources else network
     place = option or (dynamics if table == _DYNAMICS else network)
     if not option and key in sources:

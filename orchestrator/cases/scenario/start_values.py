@@ -5,7 +5,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from fmus.grid.network import OPEN_CHARGING, Network, Shunt, ThreeWinding
+from fmus.grid.network import OPEN_CHARGING, Line, Network, Shunt, ThreeWinding
 from fmus.toolchain.port_variables import (
     LARGEST_POWER,
     LARGEST_POWER_ON_BASE,
@@ -131,10 +131,34 @@ def _lines(network: Network, grid: ComponentPlan) -> list[FlowLine]:
             B=grid.number(line.variable("B")) if line.B else 0.0,
             tap=grid.number(line.variable("tap")) if line.has_ratio else 1.0,
             shift=grid.number(line.variable("shift")) if line.has_ratio else 0.0,
-            closed=is_connected(grid, line.variable("connected")),
+            closed=all(is_connected(grid, switch) for switch in _switches(line)),
         )
         for line in network.lines
     ]
+
+
+def _switches(line: Line) -> tuple[str, ...]:
+    """Switches that all have to be closed for a line to carry a current from end to end."""
+    ends = ("from_connected", "to_connected") if line.has_ends else ()
+    return tuple(line.variable(name) for name in ("connected", *ends))
+
+
+def _charged_lines(network: Network, grid: ComponentPlan) -> list[FlowShunt]:
+    """Return what lines that are open at one end draw at the other, beside the charging that open lines keep."""
+    found = []
+    for line in (line for line in network.lines if line.has_ends and line.B):
+        whole, one, other = (is_connected(grid, switch) for switch in _switches(line))
+        if not whole or one == other:
+            continue
+        jb = 0.5j * grid.number(line.variable("B")) * (1 - OPEN_CHARGING)
+        X = grid.number(line.variable("X")) - (
+            grid.number(line.variable("X_C")) if line.X_C else 0.0
+        )
+        z = complex(grid.number(line.variable("R")), X)
+        square = grid.number(line.variable("tap")) ** 2 if line.has_ratio and one else 1.0
+        y = (jb + 1 / (z + 1 / jb)) / square
+        found.append(FlowShunt(line.from_bus if one else line.to_bus, g=y.real, b=y.imag))
+    return found
 
 
 def _legs(network: Network, grid: ComponentPlan) -> list[FlowLine]:
@@ -209,6 +233,7 @@ def _shunts(network: Network, grid: ComponentPlan) -> list[FlowShunt]:
         for closed in (not shunt.switched or is_connected(grid, f"{shunt.name}.connected"),)
     ]
     stray = [bus for bus in network.buses if network.needs_stray(bus)]
+    shunts += _charged_lines(network, grid)
     return shunts + [FlowShunt(bus, g=0.0, b=grid.number("stray_B"), stray=True) for bus in stray]
 
 

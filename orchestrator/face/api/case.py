@@ -249,6 +249,7 @@ _PATHS = frozenset(
         "scan",
         "raw",
         "dyr",
+        "seq",
         "matpower",
         "pandapower",
         "cgmes",

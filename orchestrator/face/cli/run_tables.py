@@ -57,7 +57,8 @@ def print_run(
         words = f"[bold {colour}]{early_end.word}[/] {escape(early_end.place)}"
         console.print(words, soft_wrap=True, highlight=False)
     modes = [r.modes for r in results]
-    print_answers(console, [of_run(r) for r in results], modes, beside)
+    faults = dict.fromkeys(fault.in_words for m in modes for fault in m.prepared.faults)
+    print_answers(console, [of_run(r) for r in results], modes, [*beside, *faults])
     print_named_modes(console, modes)
     print_sources(console, modes)
     ring_downs = tables.ring_downs(results)

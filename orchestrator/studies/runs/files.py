@@ -31,7 +31,7 @@ from orchestrator.studies.runs.mode_plots import (
 )
 from orchestrator.studies.runs.run import RunResult
 from orchestrator.studies.runs.tables import ring_down_json
-from orchestrator.systems.coupling.events import BusFault
+from orchestrator.systems.coupling.events import BusFault, LineFault
 
 _TABLES = ("modes.csv", "participation.csv", "mode_shapes.csv")  # of `save_modes`
 _LEAST_PARTICIPATION = 1e-3  # smaller factors are left out of the files
@@ -213,6 +213,8 @@ def summary_of(result: RunResult) -> dict[str, Any]:
         else asdict(stats.adaptive),
         "events": [str(event) for event in modes.prepared.events],
         "bus_faults": [e.bus for e in modes.prepared.events if isinstance(e, BusFault) and e.on],
+        "line_faults": [e.line for e in modes.prepared.events if isinstance(e, LineFault) and e.on],
+        "sequences": [fault.as_json() for fault in modes.prepared.faults],
         "answer": of_run(result).as_json(),
         "power_flow": _power_flow(modes.prepared),
         "linearised": modes.linearised,

@@ -4,10 +4,15 @@ The reference knows no sequence networks: each element is a matrix of three phas
 phases or to earth, an open pole a phase without a conductor."""
 
 import numpy as np
+import pandapower as pp
 import pytest
+from pandapower import shortcircuit as sc
 
+from fmus.grid.network import OPEN_CHARGING
 from orchestrator.cases.case import load_case
-from orchestrator.systems.coupling.events import LineFault, PoleSwitching
+from orchestrator.cases.forcing import event_of
+from orchestrator.core.errors import CaseError, InputError
+from orchestrator.systems.coupling.events import LineEndSwitching, LineFault, PoleSwitching
 from orchestrator.systems.coupling.master import Master
 
 RING = """\
@@ -44,10 +49,34 @@ parameters = { S_n = "500 MVA", P_0 = 0.6, v_0 = 1.01 }
 [components.grid]
 model = "grid"
 """
+RADIAL = """\
+name = "radial"
+models = "phasor"
+[solver]
+stop_time = "0.5 s"
+step_size = "1 ms"
+[power_flow]
+grid = "grid"
+slack = "source"
+[network]
+lines.step_up = { from = "b2", to = "b1", X = 0.02 }
+lines.l23 = { from = "b2", to = "b3", X = 0.1, R = 0.01 }
+[network.sequences]
+line_z0 = 3.0
+groups.step_up = "YNd"
+external_z0 = 1.0
+[components.source]
+model = "external_grid"
+bus = "b1"
+parameters = { S_n = "1000 MVA", R_X = 0.1 }
+[components.grid]
+model = "grid"
+"""
 LINES = {"l12": (0, 1, 0.002 + 0.02j), "l23": (1, 2, 0.002 + 0.02j), "l31": (2, 0, 0.003 + 0.03j)}
 BUSES = ("b1", "b2", "b3")
 B1, Z0_Z1, B0_B1 = 0.04, 2.5, 0.5
 A = np.exp(2j * np.pi / 3)
+LINE_Y = 1 / (0.002 + 0.02j)  # of l12
 BOLTED = 1e8  # admittance between phases that touch
 
 
@@ -184,3 +213,138 @@ def test_an_open_pole_is_that_of_three_phases(tmp_path):
     v, reference = compared(ready, 0.3)
     reference.add_lines()
     assert v == pytest.approx(reference.positive()[:3], rel=1e-6)
+
+
+def test_a_line_opens_at_one_end_and_its_modes_are_of_that_network(tmp_path):
+    """The power flow with the line open at one end is the voltages at which the run arrives."""
+    trip = '[[events]]\ntype = "line_trip"\ntime = "0.1 s"\nline = "l31"\nat = "b3"\n'
+    ready = prepared(tmp_path, trip.replace("\nat", '\nreclose_after = "200 ms"\nat'))
+    opened, closed = ready.events
+    assert opened == LineEndSwitching(0.1, "grid", "l31", "from", False)
+    assert (closed.time, closed.connected) == (pytest.approx(0.3), True)
+    after = load_case(tmp_path / "case.toml").prepare([], {"grid.l31.from_connected": False})[0]
+    v = after.power_flow.voltages
+    y, b = 1 / (0.003 + 0.03j), 0.02j * (1 - OPEN_CHARGING)
+    charged = y + b - y**2 / (y + b) + 0.02j * OPEN_CHARGING
+    drawn = sum((v["b1"] - v[bus]) * LINE_Y + v["b1"] * 0.02j for bus in ("b2",))
+    fed = after.power_flow.powers["sg"] * 10
+    assert fed == pytest.approx(v["b1"] * np.conj(drawn + v["b1"] * charged), rel=1e-8)
+
+
+def test_what_cannot_be_is_refused_by_name(tmp_path):
+    trip = '[[events]]\ntype = "line_trip"\ntime = "0.1 s"\nline = "l31"\nat = "b2"\n'
+    with pytest.raises(CaseError, match="l31 joins b3 and b1; at = 'b2' must be one of them"):
+        prepared(tmp_path, trip)
+    emt = RING.replace('models = "phasor"', 'models = "emt"').replace("1 ms", "100 us")
+    fault = '[[events]]\ntype = "bus_fault"\ntime = "0.1 s"\nbus = "b3"\nkind = "1-phase"\n'
+    along = '[[events]]\ntype = "line_fault"\ntime = "0.1 s"\nline = "l23"\nat = 0.3\n'
+    for text, what in (
+        (fault, "a fault of kind '1-phase'"),
+        (along, "a fault along a line"),
+        (trip.replace("b2", "b3"), "a line that opens at one end"),
+    ):
+        with pytest.raises(CaseError, match=f"{what} needs a network of phasors") as caught:
+            prepared(tmp_path, text, emt)
+        assert "--set models=phasor" in str(caught.value)
+        ready = load_case(tmp_path / "case.toml").prepare([], {"models": "phasor"})[0]
+        assert ready.events  # the remedy works
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ("at = 0.3\nopens = 'line'", "'opens' needs 'duration'"),
+        ("at = 0.3\nreclose_after = '1 s'", "'reclose_after' needs 'opens'"),
+        ("at = 0.3\nduration = '0.1 s'\nopens = 'pole'", "opens = 'pole' is for a fault of kind"),
+        ("at = 1.3", "at"),
+        ("at = 0.3\nkind = '4-phase'", "kind"),
+    ],
+)
+def test_keys_of_a_fault_along_a_line_that_do_not_fit(keys, words, tmp_path):
+    with pytest.raises(CaseError, match=words):
+        prepared(
+            tmp_path, f'[[events]]\ntype = "line_fault"\ntime = "0.1 s"\nline = "l23"\n{keys}\n'
+        )
+
+
+def test_a_short_circuit_of_one_phase_has_pandapowers_current(tmp_path):
+    """Source, step-up transformer and line without loads; pandapower's c and K_T are those of IEC 60909."""
+    text = RADIAL + '[[events]]\ntype = "bus_fault"\ntime = "0.1 s"\nbus = "b3"\nkind = "1-phase"\n'
+    (found,) = prepared(tmp_path, text, "").faults
+    net = pp.create_empty_network(sn_mva=100, f_hz=50)
+    buses = [pp.create_bus(net, kv) for kv in (20.0, 110.0, 110.0)]
+    pp.create_ext_grid(
+        net, buses[0], s_sc_max_mva=1.1 * 1000, rx_max=0.1, x0x_max=1.0, r0x0_max=0.1
+    )
+    trafo = {"vk_percent": 10.0, "vkr_percent": 0.0, "vk0_percent": 10.0, "vkr0_percent": 0.0}
+    pp.create_transformer_from_parameters(
+        net,
+        buses[1],
+        buses[0],
+        500.0,
+        110.0,
+        20.0,
+        pfe_kw=0,
+        i0_percent=0,
+        vector_group="YNd",
+        shift_degree=0,
+        mag0_percent=1e9,
+        mag0_rx=0,
+        si0_hv_partial=0.9,
+        **trafo,
+    )
+    base = 110.0**2 / 100
+    pp.create_line_from_parameters(
+        net,
+        buses[1],
+        buses[2],
+        1.0,
+        0.01 * base,
+        0.1 * base,
+        0.0,
+        10.0,
+        r0_ohm_per_km=0.03 * base,
+        x0_ohm_per_km=0.3 * base,
+        c0_nf_per_km=0.0,
+    )
+    sc.calc_sc(net, fault="1ph", case="max")
+    k_t = 0.95 * 1.1 / (1 + 0.6 * 0.1)
+    change = 0.02j * (k_t - 1)  # of the transformer's X on 100 MVA, in all three sequences
+    z = 2 * found.negative + found.zero + 3 * change
+    ikss = np.sqrt(3) * 1.1 * 100 / 110 / abs(z)
+    assert net.res_bus_sc.ikss_ka.iloc[2] == pytest.approx(ikss, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "keys"),
+    [
+        ("bus_9, 150 ms, 1-phase", {"bus": "bus_9", "kind": "1-phase", "duration": 0.15}),
+        (
+            "bus 9, 150 ms, 2-phase-earth, opens line_7_9, recloses after 1 s from 2 s",
+            {"kind": "2-phase-earth", "cleared_by": "line_7_9", "reclose_after": 1.0, "time": 2.0},
+        ),
+        ("line_7_9 at 30 %, 100 ms, opens it", {"line": "line_7_9", "at": 0.3, "opens": "line"}),
+        (
+            "A - B at 0.3, 100 ms, 1-phase, opens one pole, recloses after 500 ms",
+            {"line": "A - B", "opens": "pole", "reclose_after": 0.5},
+        ),
+    ],
+)
+def test_faults_in_words(text, keys):
+    table = event_of("fault", text)
+    assert {key: getattr(table, key) for key in keys} == keys
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("bus_9, 150 ms, recloses after 1 s", "'reclose_after' needs 'cleared_by'"),
+        ("bus_9, 150 ms, 3-phase-earth", "kind = '3-phase-earth'; it must be '3-phase'"),
+        ("line_7_9 at 130 %, 100 ms", "at = '130 %'; it must be less than 1"),
+        ("line_7_9 at 30 %, 100 ms, opens line_8", "'opens it' or 'opens one pole'"),
+        ("line_7_9 at 30 %, 100 ms, opens one pole", "opens = 'pole' is for a fault of kind"),
+    ],
+)
+def test_faults_in_words_that_are_none(text, words):
+    with pytest.raises(InputError, match=words):
+        event_of("fault", text)

@@ -1,10 +1,15 @@
 """Sequence data of PSS/E: the impedances of the WSCC system by hand, and what a file of another case is told."""
 
+import json
+
 import numpy as np
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.core.errors import CaseError
+from orchestrator.cases.new.new_case import write_case
+from orchestrator.cases.new.wanted_case import WantedCase
+from orchestrator.core.errors import CaseError, InputError
+from orchestrator.face.cli import main
 from tests.cases.networks.psse import LINES, LOADS, REACTANCES, TRANSFORMERS, raw
 
 DYR = "\n".join(f"{n} 'GENCLS' 1 {h} 0.0 /" for n, h in ((1, 9.55), (2, 3.33), (3, 2.35)))
@@ -234,7 +239,10 @@ def test_ratios_of_the_case_are_no_questions(prepared):
         "machine_x0 = 0.05\n"
     )
     asked = prepared()
-    assert len(told(asked, "[network.sequences]")) == 4
+    # the machines stand behind deltas, where their own neutrals do not count
+    assert len(told(asked, "[network.sequences]")) == 3
+    at_machine = prepared(fault='bus = "bus_2"\nkind = "1-phase"')
+    assert told(at_machine, "the neutral is taken as not earthed (1 element: sg2)")
     stated = prepared(more=more)
     assert not told(stated, "[network.sequences]")
     assert stated.faults[0].negative == pytest.approx(asked.faults[0].negative)
@@ -253,3 +261,41 @@ def test_ratios_of_the_case_are_no_questions(prepared):
 def test_what_is_no_sequence_data_is_refused_by_line(text, words, prepared):
     with pytest.raises(CaseError, match=words):
         prepared(text)
+
+
+def test_gfor_new_takes_the_file_and_refuses_it_alone(tmp_path):
+    files = {"own.raw": raw(), "own.dyr": DYR, "own.seq": seq()}
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    paths = [tmp_path / name for name in files]
+    made = write_case(WantedCase((*paths,), tmp_path / "own.toml"))
+    assert 'seq = "own.seq"' in made.text
+    assert [x.line for x in made.records if "branch (sequence data)" in x.kind] == [*range(10, 16)]
+    (tmp_path / "own.m").write_text("")
+    for beside, words in (
+        ((), "no network is given"),
+        ((tmp_path / "own.m",), "need the network's RAW"),
+    ):
+        with pytest.raises(InputError, match=words):
+            write_case(WantedCase((paths[2], *beside), tmp_path / "other.toml"))
+
+
+def test_a_run_tells_the_kind_the_impedances_and_their_source(tmp_path, capsys):
+    for name, text in {"grid.raw": raw(), "grid.dyr": DYR, "grid.seq": seq()}.items():
+        (tmp_path / name).write_text(text)
+    case = CASE.format(seq='seq = "grid.seq"', fault='bus = "bus_5"')
+    (tmp_path / "case.toml").write_text(case)
+    fault = "line_4_5 at 30 %, 50 ms, 1-phase, opens one pole, recloses after 100 ms"
+    words = ["run", str(tmp_path / "case.toml"), "--stop", "1.3", "--json", "--fault", fault]
+    main([*words, "--out", str(tmp_path / "out")])
+    out, err = capsys.readouterr()
+    (scenario,) = json.loads(out)
+    told = scenario["sequences"]
+    assert [(x["kind"], x["time"]) for x in told] == [("1-phase", 1.0), ("open pole", 1.05)]
+    assert scenario["line_faults"] == ["line_4_5"]
+    assert told[0]["words"].startswith("1-phase at line_4_5, 30 %, t = 1 s: Z2 = ")
+    assert "of " in told[0]["source"]
+    page = tmp_path / "page.html"
+    main(["report", str(tmp_path / "out"), "--out", str(page)])
+    assert "1-phase at line_4_5, 30 %" in page.read_text()
+    assert "Traceback" not in err

@@ -46,7 +46,7 @@ def of_run(
         f"{asked}, and which swing is damped least?",
         answer="; ".join([*(line.words for line in lines), *beside]),
         good=good,
-        sure="; ".join([*kinds_of(scenarios), basis]),
+        sure="; ".join([*kinds_of(scenarios), *faults_of(scenarios), basis]),
         not_judged=open_,
         content=content,
         bases=bases_of(scenarios),
@@ -57,8 +57,14 @@ def of_run(
 
 
 def has_fault(scenario: Content) -> bool:
-    """Return whether a run had a fault at a bus; of a result of an earlier version this is not known."""
-    return bool(scenario.get("bus_faults"))
+    """Return whether a run had a fault; of a result of an earlier version this is not known."""
+    return bool(scenario.get("bus_faults") or scenario.get("line_faults"))
+
+
+def faults_of(scenarios: Sequence[Content]) -> list[str]:
+    """Return the faults of fewer than three phases, with the impedances of both other sequences, in words."""
+    said = (fault["words"] for s in scenarios for fault in s.get("sequences", []))
+    return [*dict.fromkeys(said)]
 
 
 def of_modes(file: Path, content: Content) -> Chapter:
