@@ -10,6 +10,11 @@ Source: PSS/E's block diagram as OpenIPSL (``PSSE/ES/EXNI.mo``) has it, but for 
 there; two fixed-point passes take v_t, which depends, behind the transformer, weakly on E_fd."""
 
 from fmus.synchronous_generator.data_lines import declared, number, pu, seconds
+from fmus.synchronous_generator.excitation.bridge_supply import (
+    FIELD_RESISTANCE,
+    Supply,
+    through_resistance,
+)
 from fmus.synchronous_generator.excitation.common import (
     SOURCE,
     Measurement,
@@ -18,7 +23,7 @@ from fmus.synchronous_generator.excitation.common import (
 )
 from fmus.toolchain.blocks import limited_low_pass
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.symbols import Expr, if_else, logic_and
+from fmus.toolchain.symbols import Expr
 
 EXNI = (
     number("K_A", 150.0, "Gain", 1e-3),
@@ -28,9 +33,7 @@ EXNI = (
     number("K_F", 0.011, "Gain of the rate feedback", 0),
     seconds("T_F1", 0.4, "First lag of the rate feedback", 1e-3),
     seconds("T_F2", 0.7, "Second lag of the rate feedback", 1e-3),
-    number(
-        "r_C_over_r_FD", 0.0, "Resistance for negative field currents over the field's; 0: none", 0
-    ),
+    FIELD_RESISTANCE,
 )
 
 
@@ -38,12 +41,8 @@ def exni(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
     """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         p = declared(m, EXNI, SOURCE)
-        own_supply = m.switch("own_supply", False, "It has a supply of its own, not the terminal")
-
-        def times_supply(signal: Expr, v_t: Expr) -> Expr:
-            return signal * if_else(own_supply, 1, v_t)
-
-        V_R0 = seen.start.E_fd / if_else(own_supply, 1, seen.start.v_t)
+        supply = Supply.declare(m)
+        V_R0 = supply.signal_for(seen.start.E_fd, seen.start.v_t)
         require_within(m, V_R0, p.V_RMIN, p.V_RMAX, ("exciter.V_RMIN", "exciter.V_RMAX"))
         measured = Measurement(m, seen)
         lagged = m.state("feedback_lag", V_R0, "pu", "V_R behind T_F2", base="E_fd")
@@ -55,6 +54,5 @@ def exni(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         )
         m.derivative(lagged, (V_R - lagged) / p.T_F2)
         m.derivative(washed, (lagged - washed) / p.T_F1)
-        E = times_supply(V_R, seen.terminal_voltage(times_supply(V_R, measured.nearly)))
-        through_resistance = logic_and(p.r_C_over_r_FD > 0, seen.I_fd < 0)
-        return measured.close(if_else(through_resistance, -p.r_C_over_r_FD * seen.I_fd, E))
+        E = supply.times(V_R, seen.terminal_voltage(supply.times(V_R, measured.nearly)))
+        return measured.close(through_resistance(E, seen.I_fd, p.r_C_over_r_FD))

@@ -25,7 +25,12 @@ Two fixed-point passes take the ceilings' v_t, because it depends, behind the tr
 
 from dataclasses import dataclass
 
-from fmus.synchronous_generator.data_lines import declared, number, pu, seconds
+from fmus.synchronous_generator.data_lines import declared, pu, seconds
+from fmus.synchronous_generator.excitation.bridge_supply import (
+    FIELD_RESISTANCE,
+    Supply,
+    through_resistance,
+)
 from fmus.synchronous_generator.excitation.common import (
     SOURCE,
     Measurement,
@@ -57,9 +62,7 @@ SCRX = (
     seconds("T_E", 0.05, "Exciter; 0 leaves the lag out"),
     pu("E_MIN", 0.0, "Lower ceiling, of E_fd at v_t = 1"),
     pu("E_MAX", 5.0, "Upper ceiling, of E_fd at v_t = 1"),
-    number(
-        "r_C_over_r_FD", 0.0, "Resistance for negative field currents over the field's; 0: none", 0
-    ),
+    FIELD_RESISTANCE,
 )
 
 
@@ -218,22 +221,18 @@ def scrx(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
     """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         p = declared(m, SCRX, SOURCE)
-        own_supply = m.switch("own_supply", False, "It has a supply of its own, not the terminal")
+        supply = Supply.declare(m)
         m.require(
             if_else(logic_and(p.T_B <= 0, p.T_A > 0), -1, 1),
             "exciter.T_B = 0 needs exciter.T_A = 0 as well",
         )
 
-        def times_supply(signal: Expr, v_t: Expr) -> Expr:
-            return signal * if_else(own_supply, 1, v_t)
-
-        x_0 = seen.start.E_fd / if_else(own_supply, 1, seen.start.v_t)
+        x_0 = supply.signal_for(seen.start.E_fd, seen.start.v_t)
         require_within(m, x_0, p.E_MIN, p.E_MAX, ("exciter.E_MIN", "exciter.E_MAX"))
         measured = Measurement(m, seen)
         compensated = lead_lag(m, "lead_lag", measured.error(x_0 / p.K), p.T_A, p.T_B, x_0 / p.K)
         x = limited_low_pass(
             m, "amplifier", p.K * compensated, p.T_E, p.E_MIN, p.E_MAX, initial=x_0
         )
-        E = times_supply(x, seen.terminal_voltage(times_supply(x, measured.nearly)))
-        through_resistance = logic_and(p.r_C_over_r_FD > 0, seen.I_fd < 0)
-        return measured.close(if_else(through_resistance, -p.r_C_over_r_FD * seen.I_fd, E))
+        E = supply.times(x, seen.terminal_voltage(supply.times(x, measured.nearly)))
+        return measured.close(through_resistance(E, seen.I_fd, p.r_C_over_r_FD))
