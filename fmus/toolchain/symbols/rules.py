@@ -34,145 +34,131 @@ def _same(x: Expr, y: Expr) -> bool:
 
 
 def _add(x: Expr, y: Expr) -> Expr:
-    return (
-        _if_else_zero(y.a, x.b + y.b)
-        if x.op == Op.IF_ELSE_ZERO == y.op and x.a is y.a
-        else y
-        if x is ZERO
-        else x
-        if y is ZERO
-        else _sub(x, y.a)
-        if y.op == Op.NEG
-        else _sub(y, x.a)
-        if x.op == Op.NEG
-        else _mul(TWO, x)
-        if _same(x, y)
-        else x.a
-        if x.op == Op.SUB and _same(x.b, y)
-        else node(Op.ADD, x, y)
-    )
+    if x.op == Op.IF_ELSE_ZERO == y.op and x.a is y.a:
+        return _if_else_zero(y.a, x.b + y.b)
+    if x is ZERO:
+        return y
+    if y is ZERO:
+        return x
+    if y.op == Op.NEG:
+        return _sub(x, y.a)
+    if x.op == Op.NEG:
+        return _sub(y, x.a)
+    if _same(x, y):
+        return _mul(TWO, x)
+    if x.op == Op.SUB and _same(x.b, y):
+        return x.a
+    return node(Op.ADD, x, y)
 
 
 def _sub(x: Expr, y: Expr) -> Expr:
-    return (
-        x
-        if y is ZERO
-        else -y
-        if x is ZERO
-        else ZERO
-        if _same(x, y)
-        else _add(x, y.a)
-        if y.op == Op.NEG
-        else x.a
-        if x.op == Op.ADD and _same(x.b, y)
-        else x.b
-        if x.op == Op.ADD and _same(x.a, y)
-        else -_add(x.a, y)
-        if x.op == Op.NEG
-        else node(Op.SUB, x, y)
-    )
+    if y is ZERO:
+        return x
+    if x is ZERO:
+        return -y
+    if _same(x, y):
+        return ZERO
+    if y.op == Op.NEG:
+        return _add(x, y.a)
+    if x.op == Op.ADD and _same(x.b, y):
+        return x.a
+    if x.op == Op.ADD and _same(x.a, y):
+        return x.b
+    if x.op == Op.NEG:
+        return -_add(x.a, y)
+    return node(Op.SUB, x, y)
 
 
 def _mul(x: Expr, y: Expr) -> Expr:
     p, q = x.op, y.op
-    return (
-        _if_else_zero(y.a, _mul(x, y.b))
-        if q == Op.IF_ELSE_ZERO
-        else _if_else_zero(x.a, _mul(x.b, y))
-        if p == Op.IF_ELSE_ZERO
-        else sq(x)
-        if _same(x, y)
-        else _scaled(x, y)
-        if p == Op.CONST
-        else _scaled(y, x)
-        if q == Op.CONST
-        else _div(x, y.a)
-        if q == Op.INV
-        else _div(y, x.a)
-        if p == Op.INV
-        else x.a
-        if p == Op.DIV and _same(x.b, y)
-        else y.a
-        if q == Op.DIV and _same(y.b, x)
-        else -_mul(x.a, y)
-        if p == Op.NEG
-        else -_mul(x, y.a)
-        if q == Op.NEG
-        else node(Op.MUL, x, y)
-    )
+    if q == Op.IF_ELSE_ZERO:
+        return _if_else_zero(y.a, _mul(x, y.b))
+    if p == Op.IF_ELSE_ZERO:
+        return _if_else_zero(x.a, _mul(x.b, y))
+    if _same(x, y):
+        return sq(x)
+    if p == Op.CONST:
+        return _scaled(x, y)
+    if q == Op.CONST:
+        return _scaled(y, x)
+    if q == Op.INV:
+        return _div(x, y.a)
+    if p == Op.INV:
+        return _div(y, x.a)
+    if p == Op.DIV and _same(x.b, y):
+        return x.a
+    if q == Op.DIV and _same(y.b, x):
+        return y.a
+    if p == Op.NEG:
+        return -_mul(x.a, y)
+    if q == Op.NEG:
+        return -_mul(x, y.a)
+    return node(Op.MUL, x, y)
 
 
 def _scaled(x: Expr, y: Expr) -> Expr:
     """A constant times an expression."""
-    return (
-        ZERO
-        if x is ZERO or y is ZERO
-        else y
-        if x is ONE
-        else -y
-        if x is MINUS_ONE
-        else _div(x, y.a)
-        if y.op == Op.INV
-        else _twice(y, y)
-        if x is TWO
-        else -_scaled(x, y.a)
-        if y.op == Op.NEG
-        else _mul(_mul(x, y.a), y.b)
-        if y.op == Op.MUL and y.a.op == Op.CONST
-        else node(Op.MUL, x, y)
-    )
+    if x is ZERO or y is ZERO:
+        return ZERO
+    if x is ONE:
+        return y
+    if x is MINUS_ONE:
+        return -y
+    if y.op == Op.INV:
+        return _div(x, y.a)
+    if x is TWO:
+        return _twice(y, y)
+    if y.op == Op.NEG:
+        return -_scaled(x, y.a)
+    if y.op == Op.MUL and y.a.op == Op.CONST:
+        return _mul(_mul(x, y.a), y.b)
+    return node(Op.MUL, x, y)
 
 
 def _div(x: Expr, y: Expr) -> Expr:
     p, q = x.op, y.op
-    return (
-        x
-        if x is ZERO or y is ONE
-        else x.b
-        if p == Op.MUL and _same(y, x.a)
-        else x.a
-        if p == Op.MUL and _same(y, x.b)
-        else operation(Op.INV, y, y)
-        if x is ONE
-        else _mul(x, y.a)
-        if q == Op.INV
-        else _div(x.a, y.a)
-        if p == Op.TWICE == q
-        else _div(ONE, y.a)
-        if q == Op.MUL and _same(y.b, x)
-        else -_div(x.a, y)
-        if p == Op.NEG
-        else node(Op.DIV, x, y)
-    )
+    if x is ZERO or y is ONE:
+        return x
+    if p == Op.MUL and _same(y, x.a):
+        return x.b
+    if p == Op.MUL and _same(y, x.b):
+        return x.a
+    if x is ONE:
+        return operation(Op.INV, y, y)
+    if q == Op.INV:
+        return _mul(x, y.a)
+    if p == Op.TWICE == q:
+        return _div(x.a, y.a)
+    if q == Op.MUL and _same(y.b, x):
+        return _div(ONE, y.a)
+    if p == Op.NEG:
+        return -_div(x.a, y)
+    return node(Op.DIV, x, y)
 
 
 def _pow(x: Expr, y: Expr) -> Expr:
     if y.op != Op.CONST:
         return node(Op.POW, x, y)
     n = y.value
-    return (
-        sqrt(x)
-        if n == 0.5
-        else node(Op.CONSTPOW, x, y)
-        if not n.is_integer() or abs(n) > _LARGEST_POWER
-        else ONE
-        if n == 0
-        else _div(ONE, x**-n)
-        if n < 0
-        else _mul(x, x ** (n - 1))
-        if n % 2
-        else sq(x ** (n / 2))
-    )
+    if n == 0.5:
+        return sqrt(x)
+    if not n.is_integer() or abs(n) > _LARGEST_POWER:
+        return node(Op.CONSTPOW, x, y)
+    if n == 0:
+        return ONE
+    if n < 0:
+        return _div(ONE, x**-n)
+    if n % 2:
+        return _mul(x, x ** (n - 1))
+    return sq(x ** (n / 2))
 
 
 def _if_else_zero(condition: Expr, y: Expr) -> Expr:
-    return (
-        ZERO
-        if y is ZERO or condition is ZERO
-        else y
-        if condition.op == Op.CONST
-        else node(Op.IF_ELSE_ZERO, condition, y)
-    )
+    if y is ZERO or condition is ZERO:
+        return ZERO
+    if condition.op == Op.CONST:
+        return y
+    return node(Op.IF_ELSE_ZERO, condition, y)
 
 
 def _twice(x: Expr, _: Expr) -> Expr:
@@ -182,7 +168,11 @@ def _twice(x: Expr, _: Expr) -> Expr:
 
 
 def _squared(x: Expr, _: Expr) -> Expr:
-    return x.a if x.op == Op.SQRT else sq(x.a) if x.op in (Op.NEG, Op.FABS) else node(Op.SQ, x, x)
+    if x.op == Op.SQRT:
+        return x.a
+    if x.op in (Op.NEG, Op.FABS):
+        return sq(x.a)
+    return node(Op.SQ, x, x)
 
 
 def _nonnegative(x: Expr) -> bool:
