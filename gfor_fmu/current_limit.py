@@ -148,7 +148,13 @@ def declare_current_limit(m: ModelBuilder, start: SteadyState) -> CurrentLimit:
         )
     with m.scope("voltage_control"):
         limit = CurrentLimit(
-            kind, declare_box_limits(m, start, kind), I_max, threshold, angle, X_R, slope
+            kind=kind,
+            box=declare_box_limits(m, start, kind),
+            I_max=I_max,
+            threshold=threshold,
+            angle=angle,
+            X_R=X_R,
+            slope=slope,
         )
     m.require(
         if_else(limit.is_kind(THRESHOLD_IMPEDANCE), I_max - threshold, 1),

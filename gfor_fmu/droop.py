@@ -68,7 +68,16 @@ def declare_droop(m: ModelBuilder, start: SteadyState, measured: Phasor) -> Droo
         )
         m.derivative(p_f, (measured.re - p_f) / tau_P)
         m.derivative(q_f, (measured.im - q_f) / tau_Q)
-    return Droop(R_f, R_V, P_0 + delta_P, Q_0 + delta_Q, U_0 + delta_U, p_f, q_f, theta)
+    return Droop(
+        R_f=R_f,
+        R_V=R_V,
+        P_ref=P_0 + delta_P,
+        Q_ref=Q_0 + delta_Q,
+        U_ref=U_0 + delta_U,
+        p_f=p_f,
+        q_f=q_f,
+        theta=theta,
+    )
 
 
 def frequency(d: Droop, delta_p_pod: Expr) -> Expr:

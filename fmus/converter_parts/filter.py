@@ -86,7 +86,15 @@ def declare_filter_data(
     # In series with the capacitor, 1/(3·10·ω_b·C_c) as the paper has it: the factor 3·10 is dimensionless.
     R_cap = 1 / (30 * B_c)
     given = port, Phasor(R_c, X_c), Phasor(R_t, X_t), B_c, R_cap
-    return FilterData(R_c, X_c, B_c, R_t, X_t, R_cap, _steady_state(*given, virtual))
+    return FilterData(
+        R_c=R_c,
+        X_c=X_c,
+        B_c=B_c,
+        R_t=R_t,
+        X_t=X_t,
+        R_cap=R_cap,
+        initial=_steady_state(*given, virtual),
+    )
 
 
 def declare_filter(
@@ -144,4 +152,4 @@ def _steady_state(
     u_c = u / Phasor(1, R_cap * B_c)
     i_s = i_g + Phasor(0, B_c) * u_c
     v_c = u + Z_c * i_s
-    return SteadyState(theta, u, i_s, i_g, v_c, power(u, i_g), drop)
+    return SteadyState(theta=theta, u=u, i_s=i_s, i_g=i_g, v_c=v_c, s=power(u, i_g), drop=drop)

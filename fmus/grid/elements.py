@@ -120,7 +120,9 @@ def declare_line_values(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> L
     def parameter(
         name: str, value: float, unit: str, text: str, minimum: float | None, maximum: float | None
     ) -> Expr:
-        base = SYSTEM_BASE if unit == "pu" and name != "tap" else "bus" if unit == "pu" else ""
+        base = ""
+        if unit == "pu":
+            base = "bus" if name == "tap" else SYSTEM_BASE
         return m.parameter(
             line.variable(name),
             value,
@@ -179,15 +181,15 @@ def declare_line(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> Branch:
     start.injected -= drawn
     end.injected += current
     return Branch(
-        current,
-        drawn,
-        values.R,
-        values.X,
-        line.from_bus,
-        line.to_bus,
-        values.ratio,
-        values.connected,
-        capacitor,
+        current=current,
+        drawn=drawn,
+        R=values.R,
+        X=values.X,
+        from_bus=line.from_bus,
+        to_bus=line.to_bus,
+        ratio=values.ratio,
+        connected=values.connected,
+        capacitor=capacitor,
     )
 
 

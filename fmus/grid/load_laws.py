@@ -130,7 +130,16 @@ def declare_following_load(
     followed = correction if held is None else correction * 3.0 - held * 2.0
     bus.injected -= followed * declared.scale
     return FollowingLoad(
-        load, bus, declared, correction, held, followed, tau, v_min, delayed, omega_b
+        data=load,
+        bus=bus,
+        load=declared,
+        correction=correction,
+        held=held,
+        followed=followed,
+        tau=tau,
+        v_min=v_min,
+        delayed=delayed,
+        omega_b=omega_b,
     )
 
 

@@ -57,7 +57,7 @@ def active_droop(m: ModelBuilder, P_0: Scalar, Pf: Expr) -> Expr:
         tunable=True,
         source=SPECIFICATION,
     )
-    beyond = _limits(m, "P", 1.0, -1.0, Pf, P_0, kp, ki)
+    beyond = _limits(m, "P", 1.0, least=-1.0, measured=Pf, start=P_0, kp=kp, ki=ki)
     return 1 + mp * (Pref + change - Pf) + beyond
 
 
@@ -136,7 +136,7 @@ def internal_voltage(
         E_0 - least,
         "the power flow asks for an internal voltage below Emin: raise Q_0 or v_0, or raise S_n",
     )
-    beyond = _limits(m, "Q", 0.44, -0.44, Qf, Q_0, kp, ki)
+    beyond = _limits(m, "Q", 0.44, least=-0.44, measured=Qf, start=Q_0, kp=kp, ki=ki)
     command = Vref + change_V + mq * (Qref + change_Q - Qf) + beyond
     error = command - Vf
     x = m.state("x_V", E_0, "pu", "Integrator of the voltage control", base="S_n")

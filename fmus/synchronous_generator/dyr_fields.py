@@ -114,14 +114,14 @@ def _record(table: Mapping[str, Any]) -> DyrRecord:
         times, same = found["times"] or "", found["same"] or ""
         chooser = f"{scope}{found['chooser']}" if found["chooser"] else ""
         one = DyrField(
-            found["name"],
-            sets,
-            negated,
-            times,
-            only,
-            all_there,
-            found["bus_of"] or "",
-            same,
+            name=found["name"],
+            parameters=sets,
+            negated=negated,
+            times=times,
+            only=only,
+            all_there=all_there,
+            bus_of=found["bus_of"] or "",
+            same_as=same,
             not_zero=found["chooser"] == "",
             zero_sets=chooser,
             switch=found["switch"] != "",

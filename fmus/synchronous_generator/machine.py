@@ -119,13 +119,22 @@ def declare_machine(
         use_exact = m.switch(
             "exact_conversion", False, "Standard data to circuit: exact, not classical"
         )
-        saturation = _saturation_factor(m, port, data, R_s, R_t, X_t, d_data.X_l)
+        saturation = _saturation_factor(m, port, data, R_s=R_s, R_t=R_t, X_t=X_t, X_l=d_data.X_l)
         start, d, q, delta_0 = _operating_point(
-            m, port, R_s, R_t, X_t, d_data, q_data, use_exact, saturation, stator_flux
+            m,
+            port,
+            R_s,
+            R_t=R_t,
+            X_t=X_t,
+            d_data=d_data,
+            q_data=q_data,
+            use_exact=use_exact,
+            saturation=saturation,
+            stator_flux=stator_flux,
         )
         w = m.state("omega", 1.0, "pu", "Rotor speed", base="f_n")
         delta = m.state("delta", delta_0, "rad", "Rotor angle in the network frame")
-    return Machine(R_s + R_t, R_t, X_t, H, D, d, q, w, delta, start)
+    return Machine(R=R_s + R_t, R_t=R_t, X_t=X_t, H=H, D=D, d=d, q=q, w=w, delta=delta, start=start)
 
 
 def machine_equations(m: ModelBuilder, g: Machine, port: DevicePort, E_fd: Expr, P_m: Expr) -> None:

@@ -113,7 +113,8 @@ def runs_of(operations: dict[int, Operation]) -> list[tuple[int, list[int]]]:
         code = max(ready, key=lambda c: (len(ready[c]), -c))
         queue, run = ready[code], list[int]()
         while queue:
-            run.append(value := queue.popleft())
+            value = queue.popleft()
+            run.append(value)
             for user in users[value]:
                 missing[user] -= 1
                 if not missing[user]:
@@ -146,10 +147,11 @@ def tape_of(model: Model) -> bytes:
         "derivatives": values.read(model.derivatives, "derivatives", at),
         "currents": values.read(nodal.currents, "currents", "xupc") if nodal else [],
     }
+    drawn = "upc" if nodal else "pcg"  # what the matrix depends on
     seldom = {
         "initialise": values.read(model.initialise, "initialise", "p"),
         "requirements": values.read(model.requirements, "requirements", "pc"),
-        "matrix": values.read(solved.values, "matrix", "upc" if nodal else "pcg") if solved else [],
+        "matrix": values.read(solved.values, "matrix", drawn) if solved else [],
     }
     rows = {name: values.behind(results, values.fixed) for name, results in often.items()}
     taken = {

@@ -177,16 +177,16 @@ class _Reader:
         bridge, driven = self._bridge()
         known = {p.name: p for p in self._interface.parameters}
         return Device(
-            dll,
-            kind,
-            bridge,
-            tuple(measured),
-            tuple(driven),
-            constants,
-            self._parameters(known),
-            self._texts(known),
-            self._circuit(),
-            bool(delay),
+            dll=dll,
+            filter_kind=kind,
+            bridge=bridge,
+            measured=tuple(measured),
+            driven=tuple(driven),
+            constants=constants,
+            parameters=self._parameters(known),
+            texts=self._texts(known),
+            circuit=self._circuit(),
+            delay=bool(delay),
             **self._start(measured),
         )
 

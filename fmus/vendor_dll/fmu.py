@@ -171,11 +171,27 @@ def dll_members(
     around = (device, circuit) if device and circuit else None
     carried = {name: f"text{n}/{_plain(at.name)}" for n, (name, at) in enumerate(dll.files.items())}
     files = {f"resources/{carried[name]}": at.read_bytes() for name, at in dll.files.items()}
-    code = host_source(interface, dll.trial, given, carried, file, variables, around)
+    code = host_source(
+        interface,
+        dll.trial,
+        given,
+        carried=carried,
+        vendor_file=file,
+        variables=variables,
+        around=around,
+    )
     tool = f"gfor-cosim {version_of('gfor-cosim')}"
 
     def described(guid: str) -> bytes:
-        return dll_description(interface, dll.trial, variables, guid, dll.identifier, tool, circuit)
+        return dll_description(
+            interface,
+            dll.trial,
+            variables,
+            guid=guid,
+            identifier=dll.identifier,
+            tool=tool,
+            circuit=circuit,
+        )
 
     digest = digest_of(
         code,

@@ -124,6 +124,10 @@ def _parameter(row: _Parameter, text: _Text) -> DllParameter:
     bounds = (None, None) if words else (bound(row.minimum), bound(row.maximum))
     if bounds == (0, 0):  # the author wrote none
         bounds = (None, None)
+    if not words:
+        default: str | Number = bound(row.default) or 0
+    else:
+        default = text(row.default.c_string) if kind else ""
     return DllParameter(
         text(row.name),
         text(row.group),
@@ -131,7 +135,7 @@ def _parameter(row: _Parameter, text: _Text) -> DllParameter:
         text(row.unit),
         row.data_type,
         bool(row.fixed),
-        (text(row.default.c_string) if kind else "") if words else bound(row.default) or 0,
+        default,
         *bounds,
     )
 

@@ -197,7 +197,19 @@ def _of_circuit(circuit: Model) -> list[HostVariable]:
         parameter = v if isinstance(v, Parameter) else None
         hidden = v.name in MEASURED
         found.append(
-            HostVariable(v.name, role, kind, 9, place, start, v.unit, v.text, parameter, v, hidden)
+            HostVariable(
+                name=v.name,
+                role=role,
+                kind=kind,
+                data_type=9,
+                offset=place,
+                start=start,
+                unit=v.unit,
+                text=v.text,
+                parameter=parameter,
+                declared=v,
+                local=hidden,
+            )
         )
     return found
 
@@ -273,7 +285,15 @@ def _variable(
     row = place.row
     text = text or row.description
     return HostVariable(
-        name, role, place.type.kind, row.data_type, place.offset, start, row.unit, text, parameter
+        name=name,
+        role=role,
+        kind=place.type.kind,
+        data_type=row.data_type,
+        offset=place.offset,
+        start=start,
+        unit=row.unit,
+        text=text,
+        parameter=parameter,
     )
 
 

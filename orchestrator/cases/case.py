@@ -599,11 +599,8 @@ def _schema_message(detail: Any, location: Sequence[str | int]) -> str:
         case _:
             seen = detail.get("input")
             in_seconds = key in _TIMES and type(seen) in (int, float)
-            shown = (
-                f" (value seen: {seen!r}{' s' if in_seconds else ''})"
-                if not isinstance(seen, dict | list)
-                else ""
-            )
-            said = fault_of(detail) + (" s" if in_seconds else "") + shown
+            unit = " s" if in_seconds else ""
+            shown = "" if isinstance(seen, dict | list) else f" (value seen: {seen!r}{unit})"
+            said = f"{fault_of(detail)}{unit}{shown}"
             remedy = (_TIMES | _SHARES).get(key, "")
             return f"{said}; {remedy}" if remedy else said

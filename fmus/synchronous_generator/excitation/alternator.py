@@ -160,7 +160,7 @@ def alternator(m: ModelBuilder, seen: Regulated) -> Alternator:
     V_E_0 = voltage_before_rectifier(E_0, p.K_C * E_0)
     V_FE_0 = p.K_E * V_E_0 + curve.part(V_E_0) + p.K_D * E_0
     state = m.state("V_E", V_E_0, "pu", "Voltage before the rectifier", base="E_fd")
-    return Alternator(m, seen, p, curve, state, V_E_0, V_FE_0)
+    return Alternator(m=m, seen=seen, p=p, curve=curve, state=state, V_E_0=V_E_0, V_FE_0=V_FE_0)
 
 
 def exac2(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:

@@ -48,16 +48,16 @@ def classical(
     v_t = port.v_0 + Phasor(common.R_t, common.X_t) * port.i_0
     start = Start(v_t.magnitude(), emf, psi_d * i.re + psi_q * i.im, v, i)
     return Machine(
-        R,
-        common.R_t,
-        common.X_t,
-        inertia,
-        common.D,
-        d,
-        q,
-        w,
-        delta,
-        start,
+        R=R,
+        R_t=common.R_t,
+        X_t=common.X_t,
+        H=inertia,
+        D=common.D,
+        d=d,
+        q=q,
+        w=w,
+        delta=delta,
+        start=start,
         salient=False,
         is_infinite=is_infinite,
     )

@@ -99,8 +99,8 @@ def declare_wound_machine(
         i_q, i_d = Expr(i.re), Expr(-i.im)
         psi_d, psi_q = v.re + R * i_q, v.im - R * i_d
         gap_d, gap_q = psi_d + (common.X_t + X_l) * i_d, psi_q + (common.X_t + X_l) * i_q
-        axis_d = _axis(m, d, dc, stator_flux, ("psi_d", psi_d), gap_d, i_d)
-        axis_q = _axis(m, q, qc, stator_flux, ("psi_q", psi_q), gap_q, i_q)
+        axis_d = _axis(m, d, dc, stator_flux=stator_flux, stator=("psi_d", psi_d), gap=gap_d, i=i_d)
+        axis_q = _axis(m, q, qc, stator_flux=stator_flux, stator=("psi_q", psi_q), gap=gap_q, i=i_q)
         iron = Expr(0)  # S·ψ_d at the operating point
         if saturation and saturation.both_axes:
             iron = S * (psi_d + dc.X_between * i_d)
@@ -118,7 +118,17 @@ def declare_wound_machine(
     v_t = port.v_0 + Phasor(common.R_t, common.X_t) * port.i_0
     start = Start(v_t.magnitude(), E_fd, psi_d * i_q - psi_q * i_d, v, i)
     return Machine(
-        R, common.R_t, common.X_t, common.H, common.D, axis_d, axis_q, w, delta, start, salient
+        R=R,
+        R_t=common.R_t,
+        X_t=common.X_t,
+        H=common.H,
+        D=common.D,
+        d=axis_d,
+        q=axis_q,
+        w=w,
+        delta=delta,
+        start=start,
+        salient=salient,
     )
 
 
@@ -219,10 +229,10 @@ def gensal(
         m,
         port,
         common,
-        WoundAxis(d, (_FIELD, _DAMPER)),
-        WoundAxis(q, (_FIRST_Q,)),
-        stator_flux,
-        saturation,
+        d=WoundAxis(d, (_FIELD, _DAMPER)),
+        q=WoundAxis(q, (_FIRST_Q,)),
+        stator_flux=stator_flux,
+        saturation=saturation,
     )
 
 
@@ -256,10 +266,10 @@ def genrou(
         m,
         port,
         common,
-        WoundAxis(d, (_FIELD, _DAMPER)),
-        WoundAxis(q, (_FIRST_Q, _SECOND_Q)),
-        stator_flux,
-        saturation,
+        d=WoundAxis(d, (_FIELD, _DAMPER)),
+        q=WoundAxis(q, (_FIRST_Q, _SECOND_Q)),
+        stator_flux=stator_flux,
+        saturation=saturation,
     )
 
 

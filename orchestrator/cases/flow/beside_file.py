@@ -124,7 +124,13 @@ def _tell(flow: PowerFlow, theirs: Mapping[str, complex], worst: str, devices: s
 def _equations(flow: PowerFlow) -> FlowEquations:
     held = {bus: abs(flow.voltages[bus]) for bus in flow.holding}
     return FlowEquations.of(
-        [*flow.voltages], flow.lines, flow.loads, flow.shunts, {}, held, flow.slack
+        [*flow.voltages],
+        flow.lines,
+        flow.loads,
+        shunts=flow.shunts,
+        active={},
+        held=held,
+        slack_bus=flow.slack,
     )
 
 

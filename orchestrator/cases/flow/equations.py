@@ -78,17 +78,17 @@ class FlowEquations:
         for bus, power in active.items():
             fed[position[bus]] += power
         return cls(
-            tuple(buses),
-            np.array([t[0] for t in triplets], dtype=np.int64),
-            np.array([t[1] for t in triplets], dtype=np.int64),
-            np.array([t[2] for t in triplets], dtype=np.complex128),
-            fed,
-            position[slack_bus],
-            np.array([bus in held for bus in buses]),
-            np.array([held.get(bus, 1.0) for bus in buses]),
-            tuple(lines),
-            current,
-            impedance,
+            buses=tuple(buses),
+            rows=np.array([t[0] for t in triplets], dtype=np.int64),
+            columns=np.array([t[1] for t in triplets], dtype=np.int64),
+            admittances=np.array([t[2] for t in triplets], dtype=np.complex128),
+            fed=fed,
+            slack=position[slack_bus],
+            held=np.array([bus in held for bus in buses]),
+            magnitudes=np.array([held.get(bus, 1.0) for bus in buses]),
+            lines=tuple(lines),
+            drawn_as_current=current,
+            drawn_as_impedance=impedance,
         )
 
     @cached_property

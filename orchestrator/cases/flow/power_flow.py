@@ -113,7 +113,9 @@ def solve_power_flow(
             for b, s in fixed.items()
         ),
     ]
-    equations = FlowEquations.of(buses, lines, drawn, shunts, active, held, slack_bus)
+    equations = FlowEquations.of(
+        buses, lines, drawn, shunts=shunts, active=active, held=held, slack_bus=slack_bus
+    )
     known = _limits_beside(limits or {}, fixed)
     if keep_limits:
         final, result, at_limits = solve_with_limits(equations, known)
@@ -123,7 +125,9 @@ def solve_power_flow(
 
         def with_stray(share: float) -> FlowEquations:
             fewer = [replace(s, b=share * s.b) if s.stray else s for s in shunts]
-            return FlowEquations.of(buses, lines, drawn, fewer, active, held, slack_bus)
+            return FlowEquations.of(
+                buses, lines, drawn, shunts=fewer, active=active, held=held, slack_bus=slack_bus
+            )
 
         raise PowerFlowError(
             explain(equations, result, with_stray if any(s.stray for s in shunts) else None)

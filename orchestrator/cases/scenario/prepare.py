@@ -182,7 +182,7 @@ class PreparedScenario:
 
     @property
     def basis(self) -> dict[str, Any]:
-        """What results have to have in common to be compared: network, model of its loads, and each machine's model."""
+        """Network, model of its loads, and model of each machine: results that differ in them are not compared."""
         table = self.case.table.network
         file = table and (
             table.raw or table.matpower or table.pandapower or table.cgmes or table.lines_file

@@ -35,6 +35,11 @@ def diagram(scenario: Scenario) -> dict[str, Any] | None:
     def of_grid(variable: str) -> str | None:
         return f"{grid}.{variable}" if variable in has else None
 
+    def power_of(load: str, in_file: float) -> float:
+        """Return the active power of a load [MW], by the parameter of the grid where it has one."""
+        power = f"{load}.P"
+        return plan.number(power) if power in has else in_file
+
     lines: list[dict[str, Any]] = [
         {
             "name": line.name,
@@ -86,7 +91,7 @@ def diagram(scenario: Scenario) -> dict[str, Any] | None:
                 "title": title(load.name),
                 "bus": load.bus,
                 "scale": of_grid(f"{load.name}.scale"),
-                "p_mw": plan.number(power) if (power := f"{load.name}.P") in has else load.p_mw,
+                "p_mw": power_of(load.name, load.p_mw),
             }
             for load in network.loads
         ],

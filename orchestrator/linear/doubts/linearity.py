@@ -204,8 +204,9 @@ def shift_of_slowest(model: LinearModel, varied: LinearModel, radius: float) -> 
 
     def is_near(real: float, imaginary: float = 0.0) -> bool:
         value = complex(real, imaginary)
-        rate = value if step is None else np.log(value) / step if value else complex(np.inf)
-        return bool(abs(rate) <= radius)
+        if step is None:
+            return abs(value) <= radius
+        return bool(value) and bool(abs(np.log(value) / step) <= radius)
 
     _, right, count = scipy.linalg.schur(A, sort=is_near)
     _, left, _ = scipy.linalg.schur(A.T, sort=is_near)

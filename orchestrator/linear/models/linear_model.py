@@ -70,7 +70,15 @@ class LinearModel:
         """The model of one matrix, without outputs that travel between components."""
         n = len(A)
         G, H, K = (sp.csr_array(shape) for shape in ((n, 0), (0, n), (0, 0)))
-        return cls(sp.csr_array(A), G, H, K, names, step_size, disagreement)
+        return cls(
+            F=sp.csr_array(A),
+            G=G,
+            H=H,
+            K=K,
+            names=names,
+            step_size=step_size,
+            disagreement=disagreement,
+        )
 
     @cached_property
     def A(self) -> Matrix:

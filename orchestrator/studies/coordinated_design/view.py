@@ -308,7 +308,11 @@ def ranking_table(design: PointsDesign) -> ColumnTable[RankedConverter]:
     """Converters by what a controller there alone would give; "" where no controller was searched."""
 
     def setting(name: str) -> Callable[[RankedConverter], Any]:
-        return lambda one: "" if (found := _ranked(one)[name]) is None else found
+        def value(one: RankedConverter) -> Any:
+            found = _ranked(one)[name]
+            return "" if found is None else found
+
+        return value
 
     def shown(form: str) -> Callable[[Any], str]:
         return lambda figure: "–" if figure == "" else f"{figure:{form}}"

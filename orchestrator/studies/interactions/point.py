@@ -78,7 +78,16 @@ class KeptModel:
     @classmethod
     def of(cls, model: LinearModel) -> Self:
         F, G, H, K = (KeptMatrix.of(matrix) for matrix in (model.F, model.G, model.H, model.K))
-        return cls(F, G, H, K, model.names, model.wires, model.step_size, model.period)
+        return cls(
+            F=F,
+            G=G,
+            H=H,
+            K=K,
+            names=model.names,
+            wires=model.wires,
+            step_size=model.step_size,
+            period=model.period,
+        )
 
     def model(self) -> LinearModel:
         F, G, H, K = (kept.matrix() for kept in (self.F, self.G, self.H, self.K))

@@ -209,16 +209,16 @@ def modes_table(judgement: JudgedInteractions) -> ColumnTable[JudgedMode]:
 
 
 def _figures(of: Callable[[Row], JudgedSystem]) -> list[Column[Row]]:
+    def frequency(row: Row) -> float | None:
+        mode = of(row).critical
+        return None if mode is None else mode.frequency_hz
+
     return [
         Column("Verdict", lambda row: of(row).stable, verdict, "stable"),
         Column("Vendors' modes [%]", of, damping_text),
         Column("", lambda row: of(row).least_damping, name="least_damping_percent"),
         Column("Mode", of, frequency_text),
-        Column(
-            "",
-            lambda row: None if (mode := of(row).critical) is None else mode.frequency_hz,
-            name="frequency_hz",
-        ),
+        Column("", frequency, name="frequency_hz"),
         Column("All modes [%]", lambda row: least_percent(of(row)), _percent_cell),
         Column("", lambda row: least_percent(of(row)), name="least_damping_of_all_percent"),
         Column("Mode of all", lambda row: _least_place(of(row))),

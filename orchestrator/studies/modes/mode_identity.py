@@ -306,11 +306,9 @@ class _Others:
         b = self._system.prepared
         paths = {name: plan.description.path for name, plan in b.system.components.items()}
         foreign = {path for path in set(paths.values()) if not is_ours(path)}
-        a = (
-            self._beside(*((self._earlier[0], False) if self._earlier else (b.name, True)))
-            if foreign
-            else None
-        )
+        if not foreign:
+            return False
+        a = self._beside(self._earlier[0], False) if self._earlier else self._beside(b.name, True)
         values = {} if a is None else _differing(a, b) or {}
         return any(paths[name.partition(".")[0]] in foreign for name in values)
 

@@ -317,6 +317,7 @@ def _doubts(blocks: Blocks, schedule: Schedule, model: LinearModel) -> tuple[str
 
 
 def step_choice_json(choice: StepChoice) -> dict[str, Any]:
+    largest = {name: choice.largest(name) for name in choice.schedules}
     return {
         "scenario": choice.prepared.name,
         "allowed": {"hertz": choice.allowed.hertz, "points": choice.allowed.points},
@@ -326,8 +327,7 @@ def step_choice_json(choice: StepChoice) -> dict[str, Any]:
         ],
         "continuous_growth_rate": choice.growth,
         "largest_step_s": {
-            name: None if (best := choice.largest(name)) is None else best.step_size
-            for name in choice.schedules
+            name: None if best is None else best.step_size for name, best in largest.items()
         },
         "left_out_s": list(choice.left_out),
         "trials": [

@@ -50,15 +50,15 @@ class Elements:
         branches = [*(line.name for line in network.lines), *(x.name for x in network.transformers)]
         wanted = table.slack or prepared.source_slack or ""
         return cls(
-            table.grid,
-            units,
-            tuple(name for name in branches if f"{name}.connected" in switches),
-            tuple(load.name for load in network.loads),
-            tuple(x.name for x in network.shunts if f"{x.name}.connected" in switches),
-            units.get(wanted, wanted),
-            prepared.power_flow.balancing if prepared.power_flow else (),
-            _step_ups(prepared, units),
-            prepared.names,
+            grid=table.grid,
+            units=units,
+            lines=tuple(name for name in branches if f"{name}.connected" in switches),
+            loads=tuple(load.name for load in network.loads),
+            shunts=tuple(x.name for x in network.shunts if f"{x.name}.connected" in switches),
+            slack=units.get(wanted, wanted),
+            balancing=prepared.power_flow.balancing if prepared.power_flow else (),
+            step_ups=_step_ups(prepared, units),
+            file=prepared.names,
         )
 
     @property

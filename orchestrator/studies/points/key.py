@@ -42,8 +42,8 @@ def scenario_content(prepared: PreparedScenario) -> dict[str, Any]:
 
 
 def component_content(description: FmuDescription) -> list[str]:
-    """What a key contains for an FMU: a hash of its file, because a vendor may keep the guid of an older file, and the
-    effect of its binding and of its connections' conversions."""
+    """Return the part of a key for an FMU: a hash of its file, because a vendor may keep the guid of an older file, and
+    the effect of its binding and of its connections' conversions."""
     own = native(description)
     port = repr(own.port) if isinstance(own, BoundDescription) else ""
     ways = repr(description.conversions) if isinstance(description, ConvertedDescription) else ""

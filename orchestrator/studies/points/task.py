@@ -29,7 +29,7 @@ from orchestrator.studies.points.store import Arrays
 
 @dataclass(frozen=True)
 class StudyCase:
-    """What all points of a study have in common: a scenario with its layers, found again by any worker."""
+    """The case that all points of a study have in common: a scenario with its layers, found again by any worker."""
 
     reference: str  # name of a built-in case, or path of a file that every worker can read
     # of the texts and of the code; a worker whose fingerprint differs refuses the task
@@ -65,14 +65,14 @@ class StudyCase:
             **besides,
         }
         return cls(
-            reference_to(case),
-            fingerprint(case),
-            prepared.name,
-            tuple(layers),
-            step_size,
-            case.trust_fmus,
-            digest(content),
-            frozenset(varied),
+            reference=reference_to(case),
+            fingerprint=fingerprint(case),
+            scenario=prepared.name,
+            layers=tuple(layers),
+            step_size=step_size,
+            trust_fmus=case.trust_fmus,
+            mark=digest(content),
+            varied=frozenset(varied),
         )
 
     def prepare(self, case: Case, values: Mapping[str, Value]) -> PreparedScenario:
@@ -82,7 +82,7 @@ class StudyCase:
 
 
 class Kept:
-    """What comes out of a point; mixed into a dataclass, which `PointStore` keeps."""
+    """The outcome of a point; mixed into a dataclass, which `PointStore` keeps."""
 
     failure: Failure | None
     keeps_failures = True  # False where the cause, such as a missing licence, may be gone next time

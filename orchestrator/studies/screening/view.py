@@ -55,7 +55,8 @@ MODES = "modes.csv"
 SUMMARY = "screening.json"
 PAGE = "screening.html"
 
-_SHOWN, _FEW = 4, 6
+_SHOWN = 4  # kinds of warnings that are listed; the others are counted
+_FEW = 6  # points that are named one by one
 _NAMED = 40  # outages of one cause that are named: a planner looks for each; items.csv has them all
 _CURVES = 6
 _MOST_MARKS = 4000

@@ -1,4 +1,4 @@
-"""What a sweep varies: ``grid.X_L=0.01:0.6:60`` as text, and as values in the variable's own unit."""
+"""The axes of a sweep: ``grid.X_L=0.01:0.6:60`` as text, and as values in the variable's own unit."""
 
 import fnmatch
 import itertools
@@ -25,7 +25,8 @@ from orchestrator.devices.fmi.description import VariableInfo
 _FORMS = "START:STOP:COUNT, log:START:STOP:COUNT or a list such as 0.1,0.2,0.5"
 # one ``component.parameter`` or several; each may be a pattern
 _KEYS = r"[^.\s]+\.[^\s,]+(\s*,\s*[^.\s]+\.[^\s,]+)*"
-_LENGTH, _SCR = "length", "scr"
+_LENGTH = "length"  # of a line, as the last part of a key
+_SCR = "scr"  # short-circuit ratio, as the last part of a key
 _MOST = 100_000
 _ALPHA_INFO = VariableInfo(
     ALPHA,

@@ -33,7 +33,8 @@ class Ending(StrEnum):
 
 @dataclass(frozen=True)
 class Until:
-    """What must not be given up: stability, and at least this damping [%] of all modes in the range where it is > 0."""
+    """A condition that must hold on: stability and, where ``damping`` [%] exceeds 0, as much of it in all modes of the
+    range."""
 
     damping: float = 0.0
 
@@ -56,7 +57,7 @@ class Until:
 
 
 def least_damping(record: PointRecord) -> float | None:
-    """Of the modes in the range [%]."""
+    """The least damping of the modes in the range [%]; None where there is none."""
     if record.modes is None or not len(record.modes.eigenvalues):
         return None
     return min(damping_percent(complex(value)) for value in record.modes.eigenvalues)

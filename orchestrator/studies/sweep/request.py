@@ -1,4 +1,4 @@
-"""What is asked of a sweep."""
+"""The request of a sweep: its axes, and the condition until which it goes."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import KW_ONLY, dataclass

@@ -14,7 +14,8 @@ from orchestrator.studies.sweep.plots import axis_label
 from orchestrator.studies.sweep.sweep import ScenarioSweep
 from orchestrator.studies.sweep.trajectories import GridPlace
 
-_FAILURES_SHOWN, _TURNS = 5, 3
+_FAILURES_SHOWN = 5  # points that could not be computed
+_TURNS = 3  # changes of stability along an axis that are named
 
 
 def trajectories(samples: Samples) -> Table:

@@ -37,7 +37,7 @@ class ParameterSweep(NoTruth):
 
     @property
     def stable(self) -> bool | None:
-        """Whether nothing grows at any point of any scenario; None where a point has no verdict and none grows."""
+        """True if nothing grows at any point of any scenario; None where a point has no verdict and none grows."""
         verdicts = [scenario.stable for scenario in self.result.scenarios]
         if False in verdicts:
             return False

@@ -95,7 +95,7 @@ class _Bench:
                 yield info
 
     def responses(self, values: Values) -> Responses | None:
-        """What the device does with other values; None where it does not run with them."""
+        """The device's answers with other values; None where it does not run with them."""
         device = self.device.with_values(values)
         try:
             return [device.play(one.recording, one.start).power for one in self.events]
@@ -181,7 +181,7 @@ class _Promise:
     slope: Numbers
 
     def gain(self, error: Numbers) -> float:
-        """What a straight line promises of the squared error [pu²]."""
+        """The part that a straight line promises to take of the squared error [pu²]."""
         return float(self.slope @ error) ** 2 / float(self.slope @ self.slope)
 
 

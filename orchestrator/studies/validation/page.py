@@ -187,7 +187,7 @@ def _not_judged(result: ValidationResult) -> str:
 
 
 def _left_open(result: ValidationResult) -> Iterator[str]:
-    """What has no limit, what its limit does not decide, and the questions for which a verdict waits."""
+    """Yield what has no limit, what its limit does not decide, and the questions for which a verdict waits."""
     limits = result.request.limits
     judged = {} if limits is None else limits.windows
     without = [

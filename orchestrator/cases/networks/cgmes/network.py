@@ -137,13 +137,15 @@ class _Reading:
             for b in self._branches
         ]
         tables = SourceTables(
-            self._place,
-            BASE_MVA,
-            np.array(self._rows),
-            np.array(rows, dtype=float).reshape(-1, 11),
-            gen,
-            np.array([b.to_earth for b in self._branches], dtype=complex).reshape(-1, 2),
-            {number: self._labels[bus] for bus, number in numbers.items()},
+            name=self._place,
+            base_mva=BASE_MVA,
+            bus=np.array(self._rows),
+            branch=np.array(rows, dtype=float).reshape(-1, 11),
+            gen=gen,
+            branch_to_earth=np.array([b.to_earth for b in self._branches], dtype=complex).reshape(
+                -1, 2
+            ),
+            labels={number: self._labels[bus] for bus, number in numbers.items()},
             titles={numbers[bus]: title for bus, title in self._titles.items() if bus in numbers},
             branch_names=tuple(BranchName(self._title_of(b.name)) for b in self._branches),
             regions={numbers[bus]: x for bus, x in self._regions.items() if bus in numbers},

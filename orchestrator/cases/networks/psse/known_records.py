@@ -70,7 +70,7 @@ _BY_HAND = "its diagram's equations, by hand"
 
 
 def _peers() -> dict[str, str]:
-    """What parts were compared with beside their diagrams, by the record's name."""
+    """Return what parts were compared with beside their diagrams, by the record's name."""
     path = Path(__file__).with_name("held_against.toml")
     table: dict[str, str] = tomllib.loads(path.read_text(encoding="utf-8"))
     return {name: peer for peer, names in table.items() for name in names.split()}

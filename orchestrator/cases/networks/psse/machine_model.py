@@ -48,7 +48,7 @@ COMPENSATION = ("exciter.R_C", "exciter.X_C")
 
 @dataclass(frozen=True)
 class MachineModel:
-    """What a generator is made of, and the parameters that its records set; or the model of a converter.
+    """Parts of a generator, and the parameters that its records set; or the model of a converter.
 
     ``partial``: a record of it was left out, and the case says what stands for it. ``doubts`` are texts with the
     parameter and the place that they are about; ``replaced`` are lines of records that an approximation stands for,

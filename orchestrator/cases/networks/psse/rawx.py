@@ -396,7 +396,8 @@ class _Lines:
 
     def __init__(self, text: str) -> None:
         self._text = text
-        self._place, self._line = 0, 1
+        self._place = 0
+        self._line = 1
 
     def of(self, place: int) -> int:
         """The line of a place, counted from 1."""

@@ -33,8 +33,11 @@ def _refuse_choice(record: DynamicRecord, field: DyrField, value: float) -> None
     )
 
 
-CEILING, FLOOR = "VRMAX", "VRMIN"
-"""Fields of an exciter's record with the limits of its regulator."""
+CEILING = "VRMAX"
+"""Field of an exciter's record with the upper limit of its regulator."""
+
+FLOOR = "VRMIN"
+"""Field with the lower limit."""
 
 
 def chosen_ceiling(known: DyrRecord, given: Mapping[str, float]) -> float:

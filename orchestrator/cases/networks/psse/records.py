@@ -279,10 +279,11 @@ END_OF_SECTION = re.compile(r"""(0|'\s*0\s*'|"\s*0\s*")\s*(/|$)""")
 _NAME = {"switched shunt": 12, "induction machine": 8}
 """Column of NAME, before others that revision 35 has as well."""
 
-_RATING_SET, _RATINGS = (
-    4,
-    12,
-)  # column of a set of ratings, by its name, and ratings that revision 35 has there
+_RATING_SET = 4
+"""Column of the name of a set of ratings, in whose place revision 35 has the ratings themselves."""
+
+_RATINGS = 12
+"""Ratings that revision 35 has there."""
 
 
 def _without_names(section: str, fields: list[str]) -> list[str]:

@@ -15,7 +15,8 @@ from scipy.sparse.linalg import spsolve
 
 from orchestrator.core.arrays import Matrix
 
-_VM, _VA = 7, 8  # columns of the table of buses
+_VM = 7  # column of the voltage's magnitude [pu] in the table of buses
+_VA = 8  # column of its angle [°]
 _DIGITS = 16  # of a number, at most
 _LEAST = 1.0  # reactive power that rounded voltages and a loose tolerance may leave at a bus [Mvar]
 _PART = 0.02  # part of a bus' reactive power that they may leave

@@ -1,4 +1,4 @@
-"""What a title between the sections of a RAW file means, however its program spells it.
+"""Titles between the sections of a RAW file: the section that each means, however its program spells it.
 
 PSS/E, its converter (``rawd33``), PowerWorld, PowSyBl and PowerModels each write titles of their own.  The sections are
 those of the data formats that PowSyBl's and MATPOWER's readers document."""
