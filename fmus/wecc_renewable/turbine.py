@@ -39,6 +39,9 @@ SOURCE = "typical values of WECC's Wind Plant Dynamic Modeling Guidelines (2014)
 LEAST_SPEED = 0.01
 """Speed [pu] below which no division by it takes place."""
 
+REST = 1e-4
+"""Error [pu] and angle [deg] within which the pitch stays at a stop: more than a linear model's perturbations."""
+
 SHAFT = (
     number("H", 5.0, "Inertia constant of turbine and generator", 1e-3, "s"),
     power("DAMP", 0.0, "Torque by the generator's speed away from that of the operating point"),
@@ -238,10 +241,11 @@ def _stopped(
     limits: tuple[Expr, Expr],
     start: Expr,
 ) -> Expr:
-    """K_P + K_I/s within limits; what rests at one is held there until the error leads away from it [deg]."""
+    """K_P + K_I/s within limits; what rests at one is held there until the error leads away by `REST` [deg]."""
     (low, high), (K_P, K_I) = limits, gains
     x = m.state(name, start, "deg", "Integrator of the pitch angle")
-    down, up = logic_and(x <= low, u <= 0), logic_and(x >= high, u >= 0)
+    down = logic_and(x <= low + REST, u <= REST)
+    up = logic_and(x >= high - REST, u >= -REST)
     y = K_P * u + x
     outward = logic_or(logic_and(y > high, u > 0), logic_and(y < low, u < 0))
     moving = if_else(outward, 0, K_I * u)

@@ -97,7 +97,7 @@ UNREACHED = {
     "DERA": "no part stands for DERA",
     "GAST (14 buses)": "several machines, by `gfor new` and `gfor run`: page of conventions",
     "LOAD": "loads of constant power and current, by `gfor run`: page of conventions",
-    "MultiGen": "several machines and converters: `gfor new` and `gfor run`",
+    "MultiGen": "several machines and converters, by `gfor new` and `gfor run`: page of conventions",
     "PSS2A, PSS2B, PSS2C": "no DYR record of the stabiliser",
     "RENA": "converters, no machine: tests.models.test_wecc_renewable",
     "STAB1": "a step of the reference: tests.models.test_psse_traces",

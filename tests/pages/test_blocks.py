@@ -40,6 +40,7 @@ FMUS = (
     "gfl",
     "gfl_l2ep",
     "regfm_a1_phasor",
+    "regfm_b1_phasor",
     "infinite_bus",
     "external_grid",
     "static_generation",

@@ -107,6 +107,13 @@ REFERENCES = (
         ("i_re", "i_im", "e_re", "e_im", "omega", "E_droop"),
     ),
     Reference(
+        "regfm_b1_phasor",
+        "fmus/regfm_b1/reference.csv",
+        {"P_0": 0.6, "Q_0": 0.05},
+        *_BUS,
+        ("i_re", "i_im", "e_re", "e_im", "omega", "E_inner"),
+    ),
+    Reference(
         "regca1_repca1_phasor",
         "fmus/wecc_renewable/reference.csv",
         {"P_0": 0.8, "Q_0": 0.05, "plant.Fflag": 1.0, "plant.RefFlag": 1.0},

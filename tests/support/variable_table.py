@@ -28,6 +28,7 @@ LEAFLETS = {
     "static_generation": ROOT / "fmus" / "static_generation" / "README.md",
     "static_generation_phasor": ROOT / "fmus" / "static_generation" / "README.md",
     "regfm_a1_phasor": ROOT / "fmus" / "regfm_a1" / "README.md",
+    "regfm_b1_phasor": ROOT / "fmus" / "regfm_b1" / "README.md",
     "csvgn1_phasor": ROOT / "fmus" / "static_var" / "README.md",
     "induction_motor_phasor": ROOT / "fmus" / "induction_machine" / "README.md",
     "regca1_phasor": ROOT / "fmus" / "wecc_renewable" / "README.md",

@@ -71,6 +71,13 @@ ALL_PATHS_OPEN = {
     "wecc_plant_phasor": {"communication_step": 5e-3, "Re": 0.01},
     "regca1_repca1_phasor": _PLANT_OPEN,
     "regca1_repca1_remote_phasor": _PLANT_OPEN,
+    "regfm_b1_phasor": {
+        "communication_step": 5e-3,
+        "Re": 0.01,
+        "kpv": 0.5,
+        "VdrpFlag": True,
+        "ImaxF": 0.55,
+    },
     "regfm_a1_phasor": {
         "communication_step": 5e-3,
         "RL": 0.01,
@@ -92,6 +99,7 @@ FED = {
 BEHIND_LEFT_OUT_BLOCKS = {"P_m", "B", "I_p_command", "I_q_command"}
 # States that act at a threshold alone, which small changes do not reach.
 BEHIND_THRESHOLDS = {name: {"pll.freezing.awake"} for name in ("gfl_l2ep", "gfl_l2ep_phasor")} | {
+    "regfm_b1_phasor": {"delta_ITmax", "delta_ITmin", "Idf", "Qf"},  # at limits, and by VdrpFlag
     "csvgn1_phasor": {"first", "second"},  # T5 = 0 leaves out the lag between them and the outputs
     "induction_motor_phasor": {"relay.latch", "relay.opening"},
 }

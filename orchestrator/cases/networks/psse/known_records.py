@@ -7,6 +7,7 @@ from pathlib import Path
 
 from fmus.grid_following.dyr_fields import FIELDS, MODEL
 from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
+from fmus.regfm_b1.dyr_fields import REGFM_B1_RECORDS
 from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS, DyrRecord
 from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
@@ -15,6 +16,7 @@ from orchestrator.cases.networks.psse.motor_loads import MOTOR_NAMES
 
 _LIBRARY = "PSS/E's model library as PowerWorld's and NEPLAN's guides and ANDES' reader describe it"
 _REGFM = "WECC's specification of REGFM_A1"
+_REGFM_B1 = "WECC's specification of REGFM_B1, in PNNL's script for PSS/E"
 _LOADS = "GridPACK's reader and model"
 _MOTORS = "PowerWorld's guide to PSS/E's load models, and STEPS' reader"
 _GENERIC = (
@@ -45,6 +47,10 @@ def known_records() -> list[KnownRecord]:
     found += [
         KnownRecord(name, record.kind, record.part, _REGFM, "; ".join(_limits(record)))
         for name, record in REGFM_A1_RECORDS.items()
+    ]
+    found += [
+        KnownRecord(name, record.kind, record.part, _REGFM_B1, "; ".join(_limits(record)))
+        for name, record in REGFM_B1_RECORDS.items()
     ]
     found += [
         KnownRecord(name, "device", record.part, _LIBRARY, "; ".join(_limits(record)))

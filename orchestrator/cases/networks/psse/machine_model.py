@@ -5,13 +5,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
+from fmus.regfm_b1.dyr_fields import REGFM_B1_RECORDS
 from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
 from fmus.wecc_renewable.dyr_fields import ELSEWHERE, PLANT_MODEL, PLANT_RECORDS
 from orchestrator.cases.networks.measured_point import MeasuredPoint
 from orchestrator.cases.networks.unit_row import DoubtOfRecord
 
-KNOWN_RECORDS = DYR_RECORDS | REGFM_A1_RECORDS | STATIC_VAR_RECORDS | PLANT_RECORDS
+GRID_FORMING_RECORDS = REGFM_A1_RECORDS | REGFM_B1_RECORDS
+
+KNOWN_RECORDS = DYR_RECORDS | GRID_FORMING_RECORDS | STATIC_VAR_RECORDS | PLANT_RECORDS
 ON_SHAFT = ("aerodynamics", "pitch", "torque")
 """Kinds of records of a wind turbine that act on its shaft."""
 
@@ -20,6 +23,7 @@ KINDS_OF_CONVERTERS = ("converter", "electrical", "plant", "shaft", *ON_SHAFT)
 
 SOURCE_IMPEDANCE = {
     "regfm_a1_phasor": ("RL", "XL"),
+    "regfm_b1_phasor": ("Re", "XL"),
     "REGCB1": ("Re", "Xe"),
     "REGCC1": ("Re", "Xe"),
 }

@@ -269,3 +269,22 @@ def test_the_system_with_such_a_plant_has_modes_and_a_run(records, prepared, tmp
 def test_records_that_lack_something_are_named(lines, words, prepared):
     with pytest.raises(CaseError, match=f"(?ms){words}"):
         prepared(with_records(*lines), "")
+
+
+MACHINE_OF_B1 = (
+    "3 'REGFMB1' 1 0 0 1 1 1 1 0.05 0 5 0.02 0.05 -0.05 0.265 2.65 0.2 -0.2 0 0.6 0 100 50 1 0.9 2 1.5 "
+    "0.02 0.02 0 0 1 0.05 /\n"
+)
+
+
+@pytest.mark.slow
+def test_a_virtual_synchronous_machine_is_the_whole_unit(prepared, tmp_path, gfor):
+    plan = unit(prepared(with_records(MACHINE_OF_B1), ""))
+    assert plan.description.model_name == "regfm_b1_phasor"
+    given = plan.parameters
+    assert (given["H"], given["kI"], given["VPLLfrz"], given["XL"]) == (0.6, 2.0, 0.05, 0.2)
+    code, out, error = gfor("modes", tmp_path / "case.toml", "--json")
+    assert code == 0, error
+    scenario = json.loads(out)["scenarios"][0]
+    assert scenario["stable"]
+    assert any("gfor3.Dw" in str(mode) for mode in scenario["modes"])
