@@ -13,7 +13,14 @@ from orchestrator.cases.form.schema import CaseTable, ComponentTable, EventTable
 from orchestrator.cases.networks.data import NetworkData
 from orchestrator.cases.networks.measured_point import MeasuredPoint
 from orchestrator.cases.networks.record_use import RecordUse
-from orchestrator.core.errors import MOST_PROBLEMS, TOO_MANY, CaseError, ErrorKind, Problem
+from orchestrator.core.errors import (
+    MOST_PROBLEMS,
+    TOO_MANY,
+    CaseError,
+    ErrorKind,
+    InputError,
+    Problem,
+)
 from orchestrator.core.options import Option
 from orchestrator.systems.coupling.system import System
 
@@ -117,7 +124,14 @@ class Draft:
         return self.data is not None and bool(self.data.flow_laws or self.data.controls)
 
     def note(self, place: str, text: str, kind: ErrorKind = ErrorKind.VALUES) -> None:
-        problem = Problem(place, text, kind)
+        self._add(Problem(place, text, kind))
+
+    def note_unread(self, place: str, error: InputError) -> None:
+        """Add the problem of a network's file, whose error may name the record; without it there is no network."""
+        self.found.network_failed = True
+        self._add(Problem(place, error.message, record=error.place))
+
+    def _add(self, problem: Problem) -> None:
         if problem not in self.found.problems:
             self.found.problems.append(problem)
             if len(self.found.problems) > MOST_PROBLEMS:

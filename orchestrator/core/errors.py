@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import Any, Self
 
 from orchestrator.core.given_files import ShownFile
 from orchestrator.core.options import Option
@@ -99,6 +99,7 @@ class CosimError(Exception):
 
     exit_code = 1
     kind = ErrorKind.OTHER
+    place = ""  # file and record that the message begins with
 
     def __init__(self, message: str = "", *, kind: ErrorKind | None = None) -> None:
         super().__init__(message)
@@ -129,6 +130,13 @@ class InputError(CosimError):
 
     exit_code = 2
     kind = ErrorKind.INPUT
+
+    @classmethod
+    def at(cls, place: str, text: str) -> Self:
+        """Return the error of a record: ``place`` names its file, and its line where it has one."""
+        error = cls(Text(place, ": ", text))
+        error.place = place
+        return error
 
 
 class ResultsError(CosimError):
@@ -183,6 +191,7 @@ class Problem:
     kind: ErrorKind = ErrorKind.VALUES
     besides: bool = False  # a question that stands beside a failure, as its likely reason
     topic: QuestionTopic | None = None  # of a question that several elements can raise
+    record: str = ""  # file and record that the text begins with, where ``place`` is the key that names the file
 
     @property
     def message(self) -> str:

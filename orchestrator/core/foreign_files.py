@@ -43,9 +43,9 @@ def check_regular(path: Path | str, label: str = "") -> None:
         return
     kind = next((word for is_one, word in _KINDS if is_one(mode)), "")
     if kind:
-        raise InputError(
-            _labelled(label, path)
-            + f": it is {kind}, and no file; write its content into a file, and give that"
+        raise InputError.at(
+            _labelled(label, path),
+            f"it is {kind}, and no file; write its content into a file, and give that",
         )
 
 
@@ -60,10 +60,10 @@ def check_name(path: Path | str, label: str = "") -> None:
     if found:
         byte = ord(found.group()) - 0xDC00
         shown = text.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
-        raise InputError(
-            _labelled(label, shown)
-            + f": its name has the byte {byte:#04x}, which is no UTF-8, and neither manifests nor FMUs "
-            "can name it; rename the file or the folder"
+        raise InputError.at(
+            _labelled(label, shown),
+            f"its name has the byte {byte:#04x}, which is no UTF-8, and neither manifests nor FMUs "
+            "can name it; rename the file or the folder",
         )
 
 
@@ -74,14 +74,14 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
     check_regular(path)
     size = path.stat().st_size
     if size > most:
-        raise InputError(
-            f"{path}: it has {size} bytes; at most {most} are read, so cut it into parts"
+        raise InputError.at(
+            f"{path}", f"it has {size} bytes; at most {most} are read, so cut it into parts"
         )
     with path.open("rb") as file:
         content = file.read(most + 1)
     if len(content) > most:
-        raise InputError(
-            f"{path}: it gave more than the {size} bytes that it has; at most {most} are read"
+        raise InputError.at(
+            f"{path}", f"it gave more than the {size} bytes that it has; at most {most} are read"
         )
     return content
 

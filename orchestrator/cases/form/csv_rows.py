@@ -43,7 +43,7 @@ def rows_of(path: Path, columns: Sequence[str]) -> list[Row]:
             if columns
             else "give the path of a .csv"
         )
-        raise InputError(f"{shown}: there is no such file; {wanted}")
+        raise InputError.at(f"{shown}", f"there is no such file; {wanted}")
     try:
         text = visible(read_text(path, encoding="utf-8-sig"))  # spreadsheets write the mark
         reader = csv.DictReader(io.StringIO(text), restval="")
@@ -51,20 +51,22 @@ def rows_of(path: Path, columns: Sequence[str]) -> list[Row]:
         _check_names(shown, names)
         missing = [c for c in columns if c not in names]
         if missing:
-            raise InputError(
-                f"{shown}: column {', '.join(missing)} is missing; it should hold {', '.join(columns)}"
+            raise InputError.at(
+                f"{shown}",
+                f"column {', '.join(missing)} is missing; it should hold {', '.join(columns)}",
             )
         rows = [
             row | {PLACE: shown.at_line(n)}
             for n, row in enumerate(islice(reader, MOST_ROWS + 1), start=2)
         ]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(
-            f"{shown}: it cannot be read as a table: {error}; save it as CSV in UTF-8"
+        raise InputError.at(
+            f"{shown}", f"it cannot be read as a table: {error}; save it as CSV in UTF-8"
         ) from error
     if len(rows) > MOST_ROWS:
-        raise InputError(
-            f"{shown}: it has more than {MOST_ROWS} rows, which is the most that a table may have"
+        raise InputError.at(
+            f"{shown}",
+            f"it has more than {MOST_ROWS} rows, which is the most that a table may have",
         )
     return rows
 
@@ -73,14 +75,15 @@ def _check_names(file: ShownFile, names: Sequence[str]) -> None:
     """A reader would take the last of two columns in silence."""
     for mark, word in ((";", "semicolons"), ("\t", "tabs")):
         if len(names) == 1 and mark in names[0]:
-            raise InputError(
-                f"{file.at_line(1)}: its columns are separated by {word}; separate them by commas, and write decimals "
-                "with a point"
+            raise InputError.at(
+                file.at_line(1),
+                f"its columns are separated by {word}; separate them by commas, and write "
+                "decimals with a point",
             )
     for k, name in enumerate(names):
         if name and name in names[:k]:
-            raise InputError(
-                f"{file.at_line(1)}: the column {name!r} stands twice; leave one of them out"
+            raise InputError.at(
+                file.at_line(1), f"the column {name!r} stands twice; leave one of them out"
             )
 
 
@@ -94,7 +97,7 @@ def number(row: Row, column: str) -> float:
     except (TypeError, ValueError):
         value = math.nan
     if not abs(value) < LARGEST:
-        raise InputError(f"{place_of(row)}: {column} = {row[column]!r} is not a number")
+        raise InputError.at(place_of(row), f"{column} = {row[column]!r} is not a number")
     return value
 
 

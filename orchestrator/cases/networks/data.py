@@ -323,9 +323,10 @@ def _read_from_raw(asked: _Asked) -> _Source:
         modelled=asked.modelled,
     )
     if not raw.machines:
-        raise InputError(
-            f"{raw.tables.name}: no generator is in service, so nothing feeds the network and nothing can swing; "
-            "give a case with generators"
+        raise InputError.at(
+            f"{raw.tables.name}",
+            "no generator is in service, so nothing feeds the network and nothing can "
+            "swing; give a case with generators",
         )
     own, changes = raw.tables.frequency, list(raw.changes)
     if own is None and table.frequency is None:
@@ -419,13 +420,15 @@ def _lines_of_file(path: Path) -> list[tuple[Line, str]]:
     ohms = "X_ohm" in next(iter(rows_of(path, ("from", "to"))), ())
     for row in rows_of(path, ("from", "to", *(_IN_OHMS if ohms else ("R", "X", "B")))):
         if not (row["from"] and row["to"]):
-            raise InputError(
-                f"{place_of(row)}: from = {row['from']!r}, to = {row['to']!r}; name the bus at each end"
+            raise InputError.at(
+                place_of(row),
+                f"from = {row['from']!r}, to = {row['to']!r}; name the bus at each end",
             )
         circuit = (row.get("circuit") or "").strip()
         if circuit and not (circuit.isascii() and circuit.isalnum()):
-            raise InputError(
-                f"{place_of(row)}: circuit = {circuit!r}; it becomes part of a name: use letters and digits"
+            raise InputError.at(
+                place_of(row),
+                f"circuit = {circuit!r}; it becomes part of a name: use letters and digits",
             )
         name = "_".join(
             ["line", row["from"], row["to"], *([circuit] if circuit not in ("", "1") else [])]
@@ -441,13 +444,13 @@ def _impedance(row: Row) -> list[float]:
     """X, R and B [pu on 100 MVA], which a row gives so or in ohms and µS at its voltage."""
     given = [key for key in ("X", "X_ohm") if (row.get(key) or "").strip()]
     if len(given) == 2:
-        raise InputError(f"{place_of(row)}: X and X_ohm are both given; leave one of them empty")
+        raise InputError.at(place_of(row), "X and X_ohm are both given; leave one of them empty")
     if "X_ohm" not in row or given == ["X"]:
         return [number(row, key) for key in ("X", "R", "B")]
     kv, R, X, B = (number(row, key) for key in _IN_OHMS)
     if kv <= 0:
-        raise InputError(
-            f"{place_of(row)}: kv = {kv:g}; ohms need the line's rated voltage, above 0"
+        raise InputError.at(
+            place_of(row), f"kv = {kv:g}; ohms need the line's rated voltage, above 0"
         )
     z = kv**2 / SYSTEM_BASE_MVA
     return [X / z, R / z, B * 1e-6 * z]

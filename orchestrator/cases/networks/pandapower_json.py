@@ -59,17 +59,20 @@ def network_text(path: Path, content: bytes) -> str:
     try:
         return json.dumps(_plain(json.loads(content)))
     except _ForeignClassError as error:
-        raise InputError(
-            f"{path}: it names {error}, which pandapower would import and call; gfor reads the tables of a network and "
-            "runs no code of a file: remove that object, and save the network again"
+        raise InputError.at(
+            f"{path}",
+            f"it names {error}, which pandapower would import and call; gfor reads the "
+            "tables of a network and runs no code of a file: remove that object, and "
+            "save the network again",
         ) from error
     except RecursionError as error:
-        raise InputError(
-            f"{path}: its brackets nest too deeply for a network; save one with pandapower.to_json"
+        raise InputError.at(
+            f"{path}",
+            "its brackets nest too deeply for a network; save one with pandapower.to_json",
         ) from error
     except ValueError as error:
-        raise InputError(
-            f"{path}: it is no network saved with pandapower.to_json: {error}"
+        raise InputError.at(
+            f"{path}", f"it is no network saved with pandapower.to_json: {error}"
         ) from error
 
 

@@ -39,43 +39,45 @@ _ZONE = 10  # the same
 
 def read_matpower(path: Path) -> SourceTables:
     if not path.is_file():
-        raise InputError(
-            f"{path}: there is no such file; give the path of a MATPOWER case (.m or .mat)"
+        raise InputError.at(
+            f"{path}", "there is no such file; give the path of a MATPOWER case (.m or .mat)"
         )
     if path.suffix not in (".m", ".mat"):
-        raise InputError(
-            f"{path}: a MATPOWER case ends in .m or .mat, and this file in {path.suffix!r}"
+        raise InputError.at(
+            f"{path}", f"a MATPOWER case ends in .m or .mat, and this file in {path.suffix!r}"
         )
     try:
         program = case_tables(path) if path.suffix == ".m" else _mat_file(path)
     except InputError:
         raise
     except Exception as error:  # scipy lets all kinds of errors through
-        raise InputError(
-            f"{path}: it cannot be read as a MATPOWER case: {error or type(error).__name__}"
+        raise InputError.at(
+            f"{path}", f"it cannot be read as a MATPOWER case: {error or type(error).__name__}"
         ) from error
     tables = program.tables
     missing = [name for name in ("baseMVA", *_COLUMNS) if tables.get(name) is None]
     if missing:
-        raise InputError(
-            f"{path}: it is not a MATPOWER case, because mpc.{', mpc.'.join(missing)} is missing"
+        raise InputError.at(
+            f"{path}", f"it is not a MATPOWER case, because mpc.{', mpc.'.join(missing)} is missing"
         )
     for name, columns in _COLUMNS.items():
         table = tables[name]
         if not isinstance(table, np.ndarray) or table.ndim != 2 or table.shape[1] < columns:
-            raise InputError(
-                f"{path}: mpc.{name} must be a table of numbers with {columns} columns or more"
+            raise InputError.at(
+                f"{path}", f"mpc.{name} must be a table of numbers with {columns} columns or more"
             )
         used = np.delete(table[:, :columns], _LIMITS[name], axis=1)
         for row in np.flatnonzero(
             ~np.isfinite(used).all(axis=1) | np.isnan(table[:, :columns]).any(axis=1)
         ):
-            raise InputError(
-                f"{path}: row {row + 1} of mpc.{name} holds Inf or NaN where only a limit may be Inf, which means none"
+            raise InputError.at(
+                f"{path}",
+                f"row {row + 1} of mpc.{name} holds Inf or NaN where only a limit may be Inf, "
+                "which means none",
             )
     base = np.asarray(tables["baseMVA"], dtype=float)
     if base.size != 1 or not 0 < base.item() < np.inf:
-        raise InputError(f"{path}: mpc.baseMVA must be one number above 0")
+        raise InputError.at(f"{path}", "mpc.baseMVA must be one number above 0")
     gen = tables["gen"].astype(float)
     gen[np.isinf(gen[:, _PMAX]), _PMAX] = 0.0  # no limit; what follows takes 0 for not known
     branch = tables["branch"]
@@ -198,8 +200,9 @@ def _pandapower_named(name: str) -> Any:
 
 def _pandapower_file(pp: Any, path: Path) -> Any:
     if not path.is_file():
-        raise InputError(
-            f"{path}: there is no such file; save a network with pandapower.to_json(net, {path.name!r})"
+        raise InputError.at(
+            f"{path}",
+            f"there is no such file; save a network with pandapower.to_json(net, {path.name!r})",
         )
     try:
         net = pp.from_json_string(network_text(path, read_bytes(path)), convert=True)
@@ -208,8 +211,8 @@ def _pandapower_file(pp: Any, path: Path) -> Any:
     except InputError:
         raise
     except Exception as error:  # whatever the decoder raises
-        raise InputError(
-            f"{path}: it is no network saved with pandapower.to_json: {error}"
+        raise InputError.at(
+            f"{path}", f"it is no network saved with pandapower.to_json: {error}"
         ) from error
     return net
 

@@ -52,7 +52,7 @@ def of_what_was_given(
 def _move_place(
     problem: Problem, sources: Mapping[str, Path], options: Mapping[str, Sequence[str]]
 ) -> Problem:
-    """Return a problem at the option or the file that its key comes from; its text may name the file already."""
+    """Return a problem at the option or the file that its key comes from; its text may begin with a record already."""
     found = _PLACE.match(problem.place)
     file = problem.place.partition(",")[0]
     if found is None or any(path.name == Path(file).name for path in sources.values()):
@@ -64,9 +64,7 @@ def _move_place(
     place = option or (dynamics if table == _DYNAMICS else network)
     if not option and key in sources:
         place = sources[key].name
-    begin = problem.text.partition(": ")[0]
-    is_named = any(path.name in begin for path in sources.values())
-    return replace(problem, place="" if is_named and not option else place)
+    return replace(problem, place="" if problem.record and not option else place)
 
 
 def _option(table: str, key: str, options: Mapping[str, Sequence[str]]) -> str:

@@ -53,7 +53,7 @@ def read_network(draft: Draft) -> None:
         draft.found.records += draft.data.records
     except InputError as error:
         where = draft.given.place("network", source) if source else draft.given.place("network")
-        draft.note_network(where, str(error))
+        draft.note_unread(where, error)
 
 
 def _static_vars(draft: Draft) -> Modelled:

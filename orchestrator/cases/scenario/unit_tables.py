@@ -71,8 +71,8 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
         if draft.found.network_failed:
             return {}  # figures that the source would have given are missing
         key = next((key for key in ("dyr", "file") if getattr(table, key) is not None), None)
-        draft.note_network(
-            draft.given.place("units", key) if key else draft.given.place("units"), str(error)
+        draft.note_unread(
+            draft.given.place("units", key) if key else draft.given.place("units"), error
         )
         return {}
     draft.known |= {f"{kind}{row.label}" for row in rows for kind in UNIT_KINDS}
@@ -187,14 +187,15 @@ def unit_rows(
         }
         missing = [column for column, value in figures.items() if value is None]
         if missing:
-            raise InputError(
-                f"{place_of(entry)}: the unit at bus {entry['bus']} has no {', '.join(missing)}; add the column, or "
-                "take the network from a source with a generator at this bus"
+            raise InputError.at(
+                place_of(entry),
+                f"the unit at bus {entry['bus']} has no {', '.join(missing)}; add the column, "
+                "or take the network from a source with a generator at this bus",
             )
         alpha = optional_number(entry, "alpha")
         if alpha is not None and not 0 <= alpha <= 1:
-            raise InputError(
-                f"{place_of(entry)}: alpha = {alpha:g}; it must be a number from 0 to 1"
+            raise InputError.at(
+                place_of(entry), f"alpha = {alpha:g}; it must be a number from 0 to 1"
             )
         own = {kind: _parameters(entry, kind) for kind in UNIT_KINDS}
         limits = {c: value for c in _LIMITS if (value := _figure(entry, c, given)) is not None}
@@ -225,8 +226,9 @@ def _name_in(entry: Row) -> str:
     """The unit's name among those of its bus; empty without one."""
     name = (entry.get("unit") or "").strip()
     if name and not re.fullmatch(r"\w+", name, re.ASCII):
-        raise InputError(
-            f"{place_of(entry)}: unit = {name!r}; it becomes part of a name: use letters, digits and _"
+        raise InputError.at(
+            place_of(entry),
+            f"unit = {name!r}; it becomes part of a name: use letters, digits and _",
         )
     return name
 
@@ -236,9 +238,10 @@ def _require_names(rows: Sequence[UnitRow], path: Path) -> None:
     labels = Counter(row.label for row in rows)
     for row in rows:
         if labels[row.label] > 1 or (at_bus[row.bus] > 1 and bus_name(row.label) == row.bus):
-            raise InputError(
-                f"{path}: the bus of unit {row.label} has more than one row; give each row of this bus a name of its "
-                "own in the column 'unit', or merge the rows"
+            raise InputError.at(
+                f"{path}",
+                f"the bus of unit {row.label} has more than one row; give each row of this "
+                "bus a name of its own in the column 'unit', or merge the rows",
             )
 
 
@@ -255,7 +258,7 @@ def _known_rows(path: Path) -> list[Row]:
                 similar,
                 f"there are {', '.join(_COLUMNS)}, and sg.… and gfor.… with a parameter",
             )
-            raise InputError(f"{path}, line 1: nothing reads the column {column!r}; {hint}")
+            raise InputError.at(f"{path}, line 1", f"nothing reads the column {column!r}; {hint}")
     return rows
 
 
@@ -271,8 +274,9 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> tuple[list[UnitRow], Sequen
         and draft.given.case.network is not None
         and draft.given.case.network.raw is not None
     ):
-        raise InputError(
-            f"{draft.given.case.network.raw}: no generator is in service (STAT = 0), so 'dyr' is of no machine"
+        raise InputError.at(
+            f"{draft.given.case.network.raw}",
+            "no generator is in service (STAT = 0), so 'dyr' is of no machine",
         )
     if not machines:
         raise InputError(
@@ -318,11 +322,13 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> tuple[list[UnitRow], Sequen
     draft.found.questions += changes.listed()
     phasors = [row for row in rows if row.converter is not None]
     if phasors and not table.generator.endswith(_PHASOR):
-        raise InputError(
-            f"{path}: the unit at bus {phasors[0].label} is the phasor model {phasors[0].converter}, and the generator "
-            f"{table.generator!r} is none; phasor models go together: write generator = "
-            "'synchronous_generator_phasor' in [units], converter = 'gfor_phasor' in [units], and model = "
-            "'phasor_grid' in [components.grid] (`gfor new --models phasor`)"
+        raise InputError.at(
+            f"{path}",
+            f"the unit at bus {phasors[0].label} is the phasor model "
+            f"{phasors[0].converter}, and the generator {table.generator!r} is none; "
+            "phasor models go together: write generator = 'synchronous_generator_phasor' "
+            "in [units], converter = 'gfor_phasor' in [units], and model = 'phasor_grid' "
+            "in [components.grid] (`gfor new --models phasor`)",
         )
     return rows, motors
 

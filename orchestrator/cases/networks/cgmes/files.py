@@ -38,15 +38,16 @@ def load_cgmes(path: Path, profiles: dict[str, bytes] | None = None) -> Any:
         return powsybl.load_from_binary_buffers([packed])
     except Exception as error:  # whatever comes through from Java
         said = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
-        raise InputError(
-            f"{path}: pypowsybl cannot read it as CGMES: {said}; check the export"
+        raise InputError.at(
+            f"{path}", f"pypowsybl cannot read it as CGMES: {said}; check the export"
         ) from error
 
 
 def profiles_of(path: Path) -> dict[str, bytes]:
     if not path.exists():
-        raise InputError(
-            f"{path}: there is no such file; give a zip or a folder with the profiles EQ, SSH, TP and SV"
+        raise InputError.at(
+            f"{path}",
+            "there is no such file; give a zip or a folder with the profiles EQ, SSH, TP and SV",
         )
     files = sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path]
     found: dict[str, bytes] = {}
@@ -57,12 +58,13 @@ def profiles_of(path: Path) -> dict[str, bytes]:
             elif file.suffix.lower() == ".xml":
                 found[file.name] = read_bytes(file)
     except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError) as error:
-        raise InputError(
-            f"{file}: it is no zip archive that can be read: {error}; export the model once more"
+        raise InputError.at(
+            f"{file}", f"it is no zip archive that can be read: {error}; export the model once more"
         ) from error
     if not found:
-        raise InputError(
-            f"{path}: it holds no .xml files; give a zip or a folder with the profiles EQ, SSH, TP and SV"
+        raise InputError.at(
+            f"{path}",
+            "it holds no .xml files; give a zip or a folder with the profiles EQ, SSH, TP and SV",
         )
     heads = [content[:_HEAD].decode("utf-8", errors="replace") for content in found.values()]
 
@@ -72,10 +74,11 @@ def profiles_of(path: Path) -> dict[str, bytes]:
 
     missing = [profile for profile, word in _NEEDED.items() if not is_there(profile, word)]
     if missing:
-        raise InputError(
-            f"{path}: the {'profiles' if len(missing) > 1 else 'profile'} {', '.join(missing)} "
-            f"{'are' if len(missing) > 1 else 'is'} missing among {few(found, 8)}; export the solved model "
-            "with EQ, SSH, TP and SV"
+        raise InputError.at(
+            f"{path}",
+            f"the {('profiles' if len(missing) > 1 else 'profile')} {', '.join(missing)} "
+            f"{('are' if len(missing) > 1 else 'is')} missing among {few(found, 8)}; "
+            "export the solved model with EQ, SSH, TP and SV",
         )
     return found
 
@@ -86,8 +89,9 @@ def _unpack(path: Path, content: bytes, found: dict[str, bytes], depth: int = 0)
         for entry in archive.infolist():
             suffix = Path(entry.filename).suffix.lower()
             if sum(map(len, found.values())) + entry.file_size > MOST_BYTES:
-                raise InputError(
-                    f"{path}: its profiles have more than {MOST_BYTES} bytes; no larger model is read"
+                raise InputError.at(
+                    f"{path}",
+                    f"its profiles have more than {MOST_BYTES} bytes; no larger model is read",
                 )
             if suffix == ".xml":
                 found[Path(entry.filename).name] = archive.read(entry)

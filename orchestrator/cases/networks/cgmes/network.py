@@ -171,9 +171,10 @@ class _Reading:
                 refused[kind] = names
         if refused:
             listed = "; ".join(f"{kind} ({few(names, 8)})" for kind, names in refused.items())
-            raise InputError(
-                f"{self._place}: the network has no such elements: {listed}; to go on without them, write "
-                f"{without_kinds([*refused])}, and put what they feed or draw into loads"
+            raise InputError.at(
+                self._place,
+                f"the network has no such elements: {listed}; to go on without them, write "
+                f"{without_kinds([*refused])}, and put what they feed or draw into loads",
             )
 
     def _buses(self, leaving_out: Sequence[str]) -> None:
@@ -187,15 +188,17 @@ class _Reading:
             islands.setdefault(int(row.synchronous_component), []).append(row.Index)
         live = [members for members in islands.values() if fed & {*members}]
         if not live:
-            raise InputError(
-                f"{self._place}: no generator in service feeds a bus; export the solved model"
+            raise InputError.at(
+                self._place, "no generator in service feeds a bus; export the solved model"
             )
         live.sort(key=len, reverse=True)
         if len(live) > 1 and "island" not in leaving_out:
             sizes = ", ".join(str(len(members)) for members in live)
-            raise InputError(
-                f"{self._place}: {len(live)} parts of the network with generators are not joined by lines (buses: "
-                f"{sizes}); study each on its own: to keep the largest, write {without_kinds(['island'])}"
+            raise InputError.at(
+                self._place,
+                f"{len(live)} parts of the network with generators are not joined by lines "
+                f"(buses: {sizes}); study each on its own: to keep the largest, write "
+                f"{without_kinds(['island'])}",
             )
         kept = {*live[0]}
         named = self._bus_names(buses)
@@ -210,8 +213,10 @@ class _Reading:
                 continue
             nominal = float(levels[row.voltage_level_id])
             if not nominal > 0:
-                raise InputError(
-                    f"{self._place}: bus {named[row.Index]} has the nominal voltage {nominal:g} kV; it must exceed 0"
+                raise InputError.at(
+                    self._place,
+                    f"bus {named[row.Index]} has the nominal voltage {nominal:g} kV; it must "
+                    "exceed 0",
                 )
             self._nominal[row.Index] = nominal
             self._volts[row.Index] = float(row.v_mag) / nominal
@@ -415,8 +420,9 @@ class _Reading:
         )
         self._changes.note(row.Index, text)
         if not math.isfinite(self._volts[bus]):
-            raise InputError(
-                f"{self._place}: the generator {row.Index} holds no voltage of its own, and SV has none of its bus; "
-                "export the solved model"
+            raise InputError.at(
+                self._place,
+                f"the generator {row.Index} holds no voltage of its own, and SV has none of "
+                "its bus; export the solved model",
             )
         return self._volts[bus]

@@ -76,7 +76,9 @@ def case_tables(path: Path) -> CaseProgram:
         for statement in statements(source):
             program.carry_out(statement)
     except UnendedError as error:
-        raise InputError(f"{path}, line {error.line}: {error}; the file is cut short") from error
+        raise InputError.at(
+            f"{path}, line {error.line}", f"{error}; the file is cut short"
+        ) from error
     return CaseProgram(program.tables, program.names)
 
 
@@ -108,10 +110,11 @@ class _Program:
         except UnknownError as error:
             shown = " ".join(statement.text.split())
             shown = shown if len(shown) <= _MOST_SHOWN else f"{shown[:_MOST_SHOWN]} …"
-            raise InputError(
-                f"{self._name}, line {statement.line}: the statement {shown!r} is not carried out: {error}; a MATPOWER "
-                "case is a program, and what it does to the tables counts: run it in MATPOWER or Octave, and save the "
-                "result with savecase"
+            raise InputError.at(
+                f"{self._name}, line {statement.line}",
+                f"the statement {shown!r} is not carried out: {error}; a MATPOWER case is a "
+                "program, and what it does to the tables counts: run it in MATPOWER or "
+                "Octave, and save the result with savecase",
             ) from error
 
     def _is_branching(self, text: str) -> bool:

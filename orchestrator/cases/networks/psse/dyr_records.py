@@ -35,10 +35,10 @@ class DynamicRecord:
 
 def read_dyr(path: Path) -> list[DynamicRecord]:
     if not path.is_file():
-        raise InputError(f"{path}: there is no such file; give the path of a PSS/E DYR file")
+        raise InputError.at(f"{path}", "there is no such file; give the path of a PSS/E DYR file")
     size = path.stat().st_size
     if size > MOST_BYTES:
-        raise InputError(f"{path}: it has {size} bytes; at most {MOST_BYTES} are read")
+        raise InputError.at(f"{path}", f"it has {size} bytes; at most {MOST_BYTES} are read")
     records: list[DynamicRecord] = []
     tokens: list[str] = []
     begin = 0
@@ -59,8 +59,8 @@ def read_dyr(path: Path) -> list[DynamicRecord]:
                 names += bool(token["quoted"]) and names == len(tokens)
                 tokens.append(token["plain"] or token["quoted"][1:-1].strip())
     if tokens:
-        raise InputError(
-            f"{path}, line {begin}: the record does not end with a slash; the file is cut short"
+        raise InputError.at(
+            f"{path}, line {begin}", "the record does not end with a slash; the file is cut short"
         )
     return records
 
@@ -72,8 +72,9 @@ def _record(file: str, line: int, tokens: Sequence[str], names: int) -> DynamicR
         name, values = tokens[1].upper(), tuple(tokens[2:])
         return DynamicRecord(file, line, 0, name, "", values, line_of_dc=tokens[0])
     if len(tokens) < 3 or not re.fullmatch(r"\d{1,9}", tokens[0]):
-        raise InputError(
-            f"{file}, line {line}: {' '.join(tokens[:4])!r} is no record; one is bus 'MODEL' id values … /"
+        raise InputError.at(
+            f"{file}, line {line}",
+            f"{' '.join(tokens[:4])!r} is no record; one is bus 'MODEL' id values … /",
         )
     name, machine, values = tokens[1].upper(), tokens[2].strip(), tuple(tokens[3:])
     if name == _OWN_MODEL and values:
@@ -86,13 +87,16 @@ def given_values(
 ) -> dict[str, float]:
     following = next((text for text in record.values[2:] if text.upper() in known), None)
     if following:
-        raise InputError(
-            f"{record.place}: the record {record.name} has no slash at its end, and runs into the next, {following}"
+        raise InputError.at(
+            record.place,
+            f"the record {record.name} has no slash at its end, and runs into the next, "
+            f"{following}",
         )
     if len(record.values) != len(fields):
-        raise InputError(
-            f"{record.place}: {record.name} has {len(record.values)} values, and needs {len(fields)}: "
-            f"{', '.join(field.name for field in fields)}"
+        raise InputError.at(
+            record.place,
+            f"{record.name} has {len(record.values)} values, and needs {len(fields)}: "
+            f"{', '.join(field.name for field in fields)}",
         )
     return {
         field.name: number_of_field(record, field, text)
@@ -108,7 +112,7 @@ def number_of_field(record: DynamicRecord, field: DyrField, text: str) -> float:
     except ValueError:
         value = math.nan
     if not abs(value) < LARGEST:
-        raise InputError(
-            f"{record.place}: {record.name} has {field.name} = {text!r}; it must be a number"
+        raise InputError.at(
+            record.place, f"{record.name} has {field.name} = {text!r}; it must be a number"
         )
     return value

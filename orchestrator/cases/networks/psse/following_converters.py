@@ -42,17 +42,19 @@ def followed(
     for record in own:
         others = FIELDS.keys() - {CONVERTER} if record.name != CONVERTER else {CONVERTER}
         if others & {*values}:
-            raise InputError(
-                f"{record.place}: a second {record.name} of machine {record.machine!r} at bus {record.bus}"
+            raise InputError.at(
+                record.place,
+                f"a second {record.name} of machine {record.machine!r} at bus {record.bus}",
             )
         fields = tuple(DyrField(name) for name in FIELDS[record.name])
         values[record.name] = given_values(record, fields, FIELDS)
     try:
         parameters, texts = approximation(values)
     except ValueError as error:
-        raise InputError(
-            f"{own[0].place}: the converter at bus {own[0].bus} cannot be approximated: {error}; write "
-            f"{replacement_of(unit)}, and a converter of ours stands there"
+        raise InputError.at(
+            own[0].place,
+            f"the converter at bus {own[0].bus} cannot be approximated: {error}; write "
+            f"{replacement_of(unit)}, and a converter of ours stands there",
         ) from None
     replaced = [(own[0].line, text) for text in texts]
     for record in (record for record in records if record.name == PLANT and PLANT in left):

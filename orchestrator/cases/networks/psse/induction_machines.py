@@ -91,10 +91,11 @@ class InductionMachine(HeldDevice):
         signs = [excess(direction * slip) for slip in _SLIPS]
         above = next((k for k, value in enumerate(signs) if value >= 0), None)
         if above is None:
-            raise InputError(
-                f"{self.place}, line {self.line}: the induction machine at bus {self.bus} cannot give PSET = "
-                f"{self.power_mw:g} MW at {v:.3g} pu: its circuit allows less; mend the record, or write "
-                f"{without_kinds([self.section])}"
+            raise InputError.at(
+                f"{self.place}, line {self.line}",
+                f"the induction machine at bus {self.bus} cannot give PSET = {self.power_mw:g}"
+                f" MW at {v:.3g} pu: its circuit allows less; mend the record, or write "
+                f"{without_kinds([self.section])}",
             )
         if above == 0:
             return direction * float(_SLIPS[0])

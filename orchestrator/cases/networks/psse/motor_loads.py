@@ -119,9 +119,11 @@ def _parameters(record: DynamicRecord, known: DyrRecord, load: FileLoad) -> dict
     base, times = (_number_in(record, known, name) for name in ("MBASE", "PMULT"))
     rating = base if base > 0 else times * load.drawn.real
     if not rating > 0:
-        raise InputError(
-            f"{record.place}: {record.name} has MBASE = {base:g} and PMULT = {times:g}: one of them gives the rating; "
-            "write MBASE in MVA, or PMULT as the rating by the load's MW, such as 1.2"
+        raise InputError.at(
+            record.place,
+            f"{record.name} has MBASE = {base:g} and PMULT = {times:g}: one of them gives "
+            "the rating; write MBASE in MVA, or PMULT as the rating by the load's MW, "
+            "such as 1.2",
         )
     drawn = load.drawn / rating
     return {**own, "S_n": rating, "P_0": -drawn.real, "Q_0": -drawn.imag}

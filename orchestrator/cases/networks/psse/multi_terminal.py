@@ -97,9 +97,10 @@ class MultiTerminal(HeldDevice):
                 )
                 rows = zip(self.terminals, kilovolts[at], fed, strict=True)
                 return [(terminal, float(v), float(i)) for terminal, v, i in rows]
-        raise InputError(
-            f"{self.place}, line {self.line}: the DC network {self.name!r} has no solution with these settings "
-            f"(SETVL) and resistances; mend the record, or write {without_kinds([self.section])}"
+        raise InputError.at(
+            f"{self.place}, line {self.line}",
+            f"the DC network {self.name!r} has no solution with these settings (SETVL) "
+            f"and resistances; mend the record, or write {without_kinds([self.section])}",
         )
 
     def _currents(self, kilovolts: np.ndarray) -> np.ndarray:

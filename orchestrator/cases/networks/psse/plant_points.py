@@ -34,14 +34,16 @@ def _measured_point(record: DynamicRecord, own_bus: int) -> MeasuredPoint | None
     numbers = []
     for name, text in zip(("BUSR", "BUS1", "BUS2"), record.values, strict=False):
         if not re.fullmatch(r"\d{1,9}", text):
-            raise InputError(
-                f"{record.place}: {record.name} has {name} = {text!r}; it must be the number of a bus, or 0"
+            raise InputError.at(
+                record.place,
+                f"{record.name} has {name} = {text!r}; it must be the number of a bus, or 0",
             )
         numbers.append(int(text))
     bus, near, far = numbers
     if bool(near) != bool(far):
-        raise InputError(
-            f"{record.place}: {record.name} has BUS1 = {near} and BUS2 = {far}; give both ends of it, or 0 twice"
+        raise InputError.at(
+            record.place,
+            f"{record.name} has BUS1 = {near} and BUS2 = {far}; give both ends of it, or 0 twice",
         )
     found = MeasuredPoint(
         0 if bus == own_bus else bus, near, far, record.values[3].strip(), record.place

@@ -234,7 +234,7 @@ def read_rawx(path: Path, text: str) -> RawFile:
             sections.setdefault(section, []).extend(records)
     sections |= _multi_terminal(path, tables) | _corrections(path, tables)
     if "bus" not in sections:
-        raise InputError(f"{path}: network.bus has no rows; export the case once more")
+        raise InputError.at(f"{path}", "network.bus has no rows; export the case once more")
     return RawFile(str(path), REVISION, base, frequency or None, sections)
 
 
@@ -349,12 +349,12 @@ def _tables(path: Path, text: str) -> Iterator[_Table]:
     try:
         whole = _JSON.decode(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(
-            f"{path}: it is no JSON: {error}; export the case from PSS/E once more"
+        raise InputError.at(
+            f"{path}", f"it is no JSON: {error}; export the case from PSS/E once more"
         ) from error
     network = whole.get("network") if isinstance(whole, dict) else None
     if not isinstance(network, dict):
-        raise InputError(f"{path}: it has no 'network', so it is no RAWX file of PSS/E")
+        raise InputError.at(f"{path}", "it has no 'network', so it is no RAWX file of PSS/E")
     at = dict(_members(text, _skip(text, 0)))["network"]
     lines = _Lines(text)
     for name, start in _members(text, at):
@@ -362,8 +362,9 @@ def _tables(path: Path, text: str) -> Iterator[_Table]:
         if not (
             isinstance(table, dict) and isinstance(table.get("fields"), list) and "data" in table
         ):
-            raise InputError(
-                f"{path}, line {lines.of(start)}: network.{name} lacks 'fields' or 'data'; export the case once more"
+            raise InputError.at(
+                f"{path}, line {lines.of(start)}",
+                f"network.{name} lacks 'fields' or 'data'; export the case once more",
             )
         fields = tuple(_field(name) for name in table["fields"])
         data = dict(_members(text, start))["data"]
@@ -384,9 +385,10 @@ def _fitting(
     """The rows, none of which has more values than the table has fields."""
     for line, row in rows:
         if len(row) > len(fields):
-            raise InputError(
-                f"{path}, line {line}: a row of network.{name} has {len(row)} values for {len(fields)} fields; "
-                "export the case once more"
+            raise InputError.at(
+                f"{path}, line {line}",
+                f"a row of network.{name} has {len(row)} values for {len(fields)} fields; "
+                "export the case once more",
             )
         yield line, row
 
@@ -417,8 +419,9 @@ def _rows(
         row, _ = _JSON.raw_decode(text, place)
         line = lines.of(place)
         if not isinstance(row, list):
-            raise InputError(
-                f"{path}, line {line}: a row of network.{name} is {row!r}; it must be a list of values"
+            raise InputError.at(
+                f"{path}, line {line}",
+                f"a row of network.{name} is {row!r}; it must be a list of values",
             )
         yield line, tuple(map(_as_text, row))
 

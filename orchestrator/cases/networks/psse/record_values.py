@@ -23,13 +23,15 @@ def _refuse_choice(record: DynamicRecord, field: DyrField, value: float) -> None
         if value == record.bus:
             return
         coarser = f", or {APPROXIMATING} for {MODEL}" if record.name in FIELDS else ""
-        raise InputError(
-            f"{record.place}: {record.name} has {_BUS} = {value:g}: its control measures at another bus than its "
-            f"terminal, which no part of ours does; write {_BUS} = 0 for the terminal{coarser}"
+        raise InputError.at(
+            record.place,
+            f"{record.name} has {_BUS} = {value:g}: its control measures at another bus "
+            f"than its terminal, which no part of ours does; write {_BUS} = 0 for the "
+            f"terminal{coarser}",
         )
     allowed = " or ".join(f"{x:g}" for x in field.only)
-    raise InputError(
-        f"{record.place}: {record.name} has {field.name} = {value:g}; only {allowed} can be modelled"
+    raise InputError.at(
+        record.place, f"{record.name} has {field.name} = {value:g}; only {allowed} can be modelled"
     )
 
 
@@ -75,19 +77,23 @@ def values_of_record(record: DynamicRecord, known: DyrRecord) -> dict[str, float
             and value not in (0, record.bus)
             and given[field.bus_of] in SIGNALS_OF_BUSES
         ):
-            raise InputError(
-                f"{record.place}: {record.name} has {field.name} = {value:g}: its signal, {field.bus_of} = "
-                f"{given[field.bus_of]:g}, is taken at another bus than the machine's own, which no part of ours does; "
-                f"write {field.name} = 0 for the own bus, or {without_models([record.name])}, and no {record.name} acts"
+            raise InputError.at(
+                record.place,
+                f"{record.name} has {field.name} = {value:g}: its signal, {field.bus_of} = "
+                f"{given[field.bus_of]:g}, is taken at another bus than the machine's own, "
+                f"which no part of ours does; write {field.name} = 0 for the own bus, or "
+                f"{without_models([record.name])}, and no {record.name} acts",
             )
         if field.same_as and value != given[field.same_as]:
-            raise InputError(
-                f"{record.place}: {record.name} has {field.name} = {value:g} and {field.same_as} = "
-                f"{given[field.same_as]:g}; our part has one value for both"
+            raise InputError.at(
+                record.place,
+                f"{record.name} has {field.name} = {value:g} and {field.same_as} = "
+                f"{given[field.same_as]:g}; our part has one value for both",
             )
         if field.not_zero and value == 0:
-            raise InputError(
-                f"{record.place}: {record.name} has {field.name} = 0, which PSS/E replaces; give its value"
+            raise InputError.at(
+                record.place,
+                f"{record.name} has {field.name} = 0, which PSS/E replaces; give its value",
             )
         if field.zero_sets:
             found[field.zero_sets] = value == 0

@@ -105,7 +105,7 @@ class Record:
         return int(value)
 
     def error(self, text: str) -> InputError:
-        return InputError(f"{self.place}, line {self.line}: {text}")
+        return InputError.at(f"{self.place}, line {self.line}", f"{text}")
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ def read_records(path: Path) -> RawFile:
     lines = numbered_lines(text_of(path))
     first = next(lines, None)
     if first is None:
-        raise InputError(f"{path}: it is empty; export the case from PSS/E as RAW")
+        raise InputError.at(f"{path}", "it is empty; export the case from PSS/E as RAW")
     head = Record(str(path), first[0], fields_of(first[1]))
     titles = [next(lines, None) for _ in range(2)]
     begin = [line for line in (next(lines, None),) if line is not None]
@@ -213,14 +213,14 @@ def _is_oldest_bus(line: str) -> bool:
 def text_of(path: Path) -> str:
     """The text of a file, in UTF-8 or, if it is none, Latin-1."""
     if not path.is_file():
-        raise InputError(f"{path}: there is no such file; give the path of a PSS/E RAW file")
+        raise InputError.at(f"{path}", "there is no such file; give the path of a PSS/E RAW file")
     size = path.stat().st_size
     if size > MOST_BYTES:
-        raise InputError(f"{path}: it has {size} bytes; at most {MOST_BYTES} are read")
+        raise InputError.at(f"{path}", f"it has {size} bytes; at most {MOST_BYTES} are read")
     content = read_bytes(path, MOST_BYTES)
     if b"\x00" in content[:4096]:
-        raise InputError(
-            f"{path}: it is no text, perhaps a saved case (.sav); export it from PSS/E as RAW"
+        raise InputError.at(
+            f"{path}", "it is no text, perhaps a saved case (.sav); export it from PSS/E as RAW"
         )
     try:
         text = content.decode("utf-8-sig")
@@ -261,15 +261,16 @@ def _sections(
         elif name == "end" and not _RECORD.match(line):
             continue  # what a program says behind the last section
         elif name == "end":
-            raise InputError(
-                f"{path}, line {number}: the line before these data does not say which begin {_REMEDY}"
+            raise InputError.at(
+                f"{path}, line {number}",
+                f"the line before these data does not say which begin {_REMEDY}",
             )
         else:
             fields = fields_of(line)
             fields = _without_names(name, fields) if revision >= NAMES else fields
             sections.setdefault(name, []).append(Record(str(path), number, fields))
     if not {"bus", "branch"} <= {*sections} or name in _HEAD:
-        raise InputError(f"{path}: it ends within its {name} data; export the case once more")
+        raise InputError.at(f"{path}", f"it ends within its {name} data; export the case once more")
     return sections, guessed if named else {}
 
 
@@ -307,9 +308,11 @@ def _following(path: Path, number: int, line: str, name: str, order: list[str]) 
         return name  # each substation has sections of its own
     shunts = ended.endswith("shunt") and name.endswith("shunt")  # either may be called just so
     if ended in order and name in order and ended != name and not shunts:
-        raise InputError(
-            f"{path}, line {number}: it ends the {ended} data, and what stands before it are {name} data by the lines "
-            "between sections; one of these is missing or wrong: export the case once more"
+        raise InputError.at(
+            f"{path}, line {number}",
+            f"it ends the {ended} data, and what stands before it are {name} data by the "
+            "lines between sections; one of these is missing or wrong: export the case "
+            "once more",
         )
     found = BEGIN_OF_SECTION.search(line)
     if found:
@@ -317,7 +320,9 @@ def _following(path: Path, number: int, line: str, name: str, order: list[str]) 
     if name not in order:
         if ended:
             return "end"
-        raise InputError(f"{path}, line {number}: the line does not say which data begin {_REMEDY}")
+        raise InputError.at(
+            f"{path}, line {number}", f"the line does not say which data begin {_REMEDY}"
+        )
     following = order.index(name) + 1
     return order[following] if following < len(order) else "end"
 
@@ -432,7 +437,9 @@ def leave_out(raw: RawFile, allowed: Sequence[str], changes: Changes) -> None:
         elif section not in LEFT_OUT:
             refused.append(f"{section} (line {', '.join(map(str, lines))})")
     if refused:
-        raise InputError(
-            f"{raw.place}: the network has no such elements: {'; '.join(refused)}; to go on without them, write "
-            f"{without_kinds([text.split(' (line')[0] for text in refused])}, and put what they feed or draw into loads"
+        raise InputError.at(
+            raw.place,
+            f"the network has no such elements: {'; '.join(refused)}; to go on without "
+            f"them, write {without_kinds([text.split(' (line')[0] for text in refused])}, "
+            "and put what they feed or draw into loads",
         )

@@ -75,7 +75,7 @@ def read_sequence_file(path: Path) -> SequenceFile:
     Raises an `InputError` with file and line for what is no sequence data."""
     state = path.stat() if path.is_file() else None
     if state is None:
-        raise InputError(f"{path}: there is no such file; give the path of a PSS/E SEQ file")
+        raise InputError.at(f"{path}", "there is no such file; give the path of a PSS/E SEQ file")
     return _read(path, (state.st_mtime_ns, state.st_size))
 
 
@@ -84,7 +84,9 @@ def _read(path: Path, version: tuple[int, int]) -> SequenceFile:
     lines = numbered_lines(text_of(path))
     first = next(lines, None)
     if first is None or not fields_of(first[1]):
-        raise InputError(f"{path}: it is empty; export the case's sequence data from PSS/E as SEQ")
+        raise InputError.at(
+            f"{path}", "it is empty; export the case's sequence data from PSS/E as SEQ"
+        )
     head = Record(str(path), first[0], fields_of(first[1]))
     change, revision = head.whole(0, "IC", 0), head.whole(1, "the revision REV", 0)
     if change not in (0, 1):
@@ -131,8 +133,9 @@ def _following(path: Path, number: int, line: str, name: str) -> str:
     if found:
         section = section_of(found[1])
         if not section:
-            raise InputError(
-                f"{path}, line {number}: {found[1]!r} is no section of sequence data; is it another file of PSS/E?"
+            raise InputError.at(
+                f"{path}, line {number}",
+                f"{found[1]!r} is no section of sequence data; is it another file of PSS/E?",
             )
         return section
     if name == "system-wide":

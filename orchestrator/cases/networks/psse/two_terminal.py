@@ -108,10 +108,11 @@ class TwoTerminal(HeldDevice):
         between = self._with_least_angles(rectifier, inverter)
         if between is not None:
             return between
-        raise InputError(
-            f"{self.place}, line {self.line}: the DC line {self.name!r} cannot carry SETVL = {self.setting:g} with "
-            f"VSCHD = {self.scheduled_kv:g} kV and RDC = {self.r_ohm:g} ohm at its buses' voltages; mend the record, "
-            f"or write {without_kinds([self.section])}"
+        raise InputError.at(
+            f"{self.place}, line {self.line}",
+            f"the DC line {self.name!r} cannot carry SETVL = {self.setting:g} with VSCHD "
+            f"= {self.scheduled_kv:g} kV and RDC = {self.r_ohm:g} ohm at its buses' "
+            f"voltages; mend the record, or write {without_kinds([self.section])}",
         )
 
     def _inverter_kv(self, v_pu: float, current: float) -> float:

@@ -123,8 +123,9 @@ class VscLine(HeldDevice):
                 fed = -voltage * current - volts.loss(current)
                 return (fed, power.dc_setting) if holding == 0 else (power.dc_setting, fed)
             current = (current + wanted) / 2
-        raise InputError(
-            f"{self.place}, line {self.line}: the DC line {self.name!r} cannot carry DCSET = {power.dc_setting:g} MW "
-            f"with {voltage:g} kV and RDC = {self.r_ohm:g} ohm; mend the record, or write "
-            f"{without_kinds([self.section])}"
+        raise InputError.at(
+            f"{self.place}, line {self.line}",
+            f"the DC line {self.name!r} cannot carry DCSET = {power.dc_setting:g} MW with "
+            f"{voltage:g} kV and RDC = {self.r_ohm:g} ohm; mend the record, or write "
+            f"{without_kinds([self.section])}",
         )
