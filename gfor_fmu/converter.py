@@ -11,6 +11,7 @@ from fmus.toolchain.symbols import Expr
 from gfor_fmu.droop import Droop, declare_droop, frequency, voltage_reference
 from gfor_fmu.inner_loops import inner_loops
 from gfor_fmu.negative_sequence import declare_negative_sequence_drop
+from gfor_fmu.phase_limit import declare_phase_limit
 from gfor_fmu.pod import pod
 from gfor_fmu.usual import FORMING
 from gfor_fmu.virtual_impedance import declare_virtual_impedance
@@ -69,7 +70,7 @@ def declare_converter(
     measured
         Frequency that the POD controllers act on [pu], as of `outer_control`.
     of_phases
-        Whether the port has phases, and so the control a resistance to the negative sequence.
+        Whether the port has phases, and so the control a resistance to the negative sequence and a limit of each.
     """
     virtual = declare_virtual_impedance(m)
     electrical = declare_filter(m, port, virtual.rated)
@@ -81,8 +82,16 @@ def declare_converter(
         if of_phases
         else None
     )
+    phases = declare_phase_limit(m, electrical, port.omega_b, control.omega) if of_phases else None
     v_c, limited = inner_loops(
-        m, electrical, port.omega_b, control.omega, control.u_ref, virtual, beside=beside
+        m,
+        electrical,
+        port.omega_b,
+        control.omega,
+        control.u_ref,
+        virtual,
+        beside=beside,
+        phases=phases,
     )
     # Exactly the power at the capacitor while nothing is limited.
     s = power(electrical.u + limited.informed, electrical.i_g.value)

@@ -4,7 +4,7 @@ Each of the three acts like an impedance Z between the voltage reference and the
 The voltage control turns a voltage into a demand by its gain k_p: a demand i* gives the reference i = i*/(1 + k_p·Z).
 What the limit takes from the voltage is Z·i = (i* − i)/k_p. It is exactly 0 while the limit does not act."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fmus.converter_parts.filter import SteadyState
 from fmus.toolchain.frames import ZERO, Phasor
@@ -58,6 +58,18 @@ class CurrentLimit:
     def is_kind(self, *kinds: int) -> Expr:
         """Return whether the limit is one of these kinds."""
         return logic_and(self.kind > min(kinds) - 0.5, self.kind < max(kinds) + 0.5)
+
+    @property
+    def largest(self) -> Expr:
+        """Largest current that passes [pu, S_n]: the box's corner, or I_max."""
+        corner = sqrt(self.box.i_q_max**2 + self.box.i_d_max**2)
+        return if_else(self.is_kind(BOX), corner, self.I_max)
+
+    def lowered(self, cut: Expr) -> "CurrentLimit":
+        """Return the limit without a part of it, 0 to 1."""
+        left = 1 - cut
+        box = BoxLimits(self.box.i_q_max * left, self.box.i_d_max * left)
+        return replace(self, box=box, I_max=self.I_max * left, threshold=self.threshold * left)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from fmus.converter_parts.current_control import current_control
 from fmus.converter_parts.filter import APPENDIX, MeasuredFilter
 from fmus.toolchain.frames import Phasor, QdState, qd_state
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.symbols import Expr, fabs, if_else, logic_and
+from fmus.toolchain.symbols import Expr, fabs, fmax, if_else, logic_and
 from gfor_fmu.current_limit import (
     BOX,
     CurrentLimit,
@@ -12,6 +12,7 @@ from gfor_fmu.current_limit import (
     declare_current_limit,
     limited_current,
 )
+from gfor_fmu.phase_limit import PhaseLimit
 from gfor_fmu.virtual_impedance import VirtualImpedance, declare_inductive_voltage
 
 
@@ -24,6 +25,7 @@ def inner_loops(
     virtual: VirtualImpedance,
     *,
     beside: Phasor | None = None,
+    phases: PhaseLimit | None = None,
 ) -> tuple[Phasor, LimitedCurrent]:
     """Declare both loops; return the voltage that the converter applies [pu, S_n], and the limit at work.
 
@@ -43,6 +45,8 @@ def inner_loops(
         The virtual impedance.
     beside
         What else the voltage reference falls by, converter's frame [pu, S_n]; nothing by default.
+    phases
+        What lowers the limit where a phase carries more; nothing by default.
     """
     start = f.initial
     u_lagged, i_g_lagged, slope = _feed_forwards(m, f)
@@ -77,6 +81,9 @@ def inner_loops(
         error = u_ref - drop - f.u
         demanded = k_p * error + x.value + Phasor(0, w * f.B_c) * f.u + i_g_lagged
     limit = declare_current_limit(m, start)
+    if phases is not None:
+        phases.follow(m, limit.largest)
+        limit = limit.lowered(fmax(phases.cut, 0))
     found = limited_current(limit, demanded, k_p)
     _integrate_what_is_left(m, x, limit, found, k_i, error)
     return current_control(m, f, omega_b, w, found.allowed, u_lagged), found
