@@ -94,7 +94,7 @@ SETS = (
 UNREACHED = {
     "CSVGN1": "a static var system, no machine",
     "DEGOV": "the recordings are PowerWorld's, not PSS/E's",
-    "DERA": "no part stands for DERA",
+    "DERA": "distributed generation, no machine: tests.models.test_distributed_generation",
     "GAST (14 buses)": "several machines, by `gfor new` and `gfor run`: page of conventions",
     "LOAD": "loads of constant power and current, by `gfor run`: page of conventions",
     "MultiGen": "several machines and converters, by `gfor new` and `gfor run`: page of conventions",

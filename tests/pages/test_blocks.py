@@ -46,6 +46,7 @@ FMUS = (
     "static_generation",
     "csvgn1_phasor",
     "induction_motor_phasor",
+    "dera1_phasor",
     "regca1_phasor",
 )
 """FMUs that the Python blocks of the leaflets open."""

@@ -128,6 +128,13 @@ REFERENCES = (
         ("i_re", "i_im", "e_re", "e_im", "B"),
     ),
     Reference(
+        "dera1_phasor",
+        "fmus/distributed_generation/reference.csv",
+        {"P_0": 0.8, "Q_0": 0.05, "Kqv": 5.0, "dbd1": -0.001, "dbd2": 0.001},
+        *_BUS,
+        ("i_re", "i_im", "e_re", "e_im", "I_p_fed", "I_q_fed", "share"),
+    ),
+    Reference(
         "induction_motor_phasor",
         "fmus/induction_machine/reference.csv",
         {"P_0": -0.8, "Q_0": -0.35, "R2": 0.05, "X2": 0.1, "E": 2.0},

@@ -67,6 +67,13 @@ ALL_PATHS_OPEN = {
     "static_generation_phasor": {"communication_step": 5e-3, "R": 0.01},
     "csvgn1_phasor": {"communication_step": 5e-3, "R": 0.01},
     "induction_motor_phasor": {"communication_step": 5e-3, "R2": 0.05, "X2": 0.1, "A": 0.5},
+    "dera1_phasor": {
+        "communication_step": 5e-3,
+        "R_port": 0.01,
+        "Kqv": 2.0,
+        "dbd1": 0.0,
+        "dbd2": 0.0,
+    },
     "regca1_phasor": _PLANT_OPEN,
     "wecc_plant_phasor": {"communication_step": 5e-3, "Re": 0.01},
     "regca1_repca1_phasor": _PLANT_OPEN,

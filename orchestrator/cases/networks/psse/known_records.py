@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from fmus.distributed_generation.dyr_fields import DISTRIBUTED_RECORDS
 from fmus.grid_following.dyr_fields import FIELDS, MODEL
 from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
 from fmus.regfm_b1.dyr_fields import REGFM_B1_RECORDS
@@ -18,6 +19,7 @@ _LIBRARY = "PSS/E's model library as PowerWorld's and NEPLAN's guides and ANDES'
 _REGFM = "WECC's specification of REGFM_A1"
 _REGFM_B1 = "WECC's specification of REGFM_B1, in PNNL's script for PSS/E"
 _LOADS = "GridPACK's reader and model"
+_DISTRIBUTED = "WECC's specification of DER_A; fields as PowerSystems.jl lists PSS/E's"
 _MOTORS = "PowerWorld's guide to PSS/E's load models, and STEPS' reader"
 _GENERIC = (
     "WECC's generic converters: fields as ANDES and GridPACK read them, diagrams of WECC's guide"
@@ -67,6 +69,10 @@ def known_records() -> list[KnownRecord]:
     found += [
         KnownRecord(name, _KINDS[record.kind], record.part, _GENERIC, "; ".join(_of_plant(name)))
         for name, record in PLANT_RECORDS.items()
+    ]
+    found += [
+        KnownRecord(name, "converter", record.part, _DISTRIBUTED, "; ".join(_limits(record)))
+        for name, record in DISTRIBUTED_RECORDS.items()
     ]
     by_name = _peers()
     return [replace(r, held_against=by_name.get(r.name, _BY_HAND)) for r in found]

@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from fmus.distributed_generation.dyr_fields import DISTRIBUTED_RECORDS
 from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
 from fmus.regfm_b1.dyr_fields import REGFM_B1_RECORDS
 from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
@@ -14,7 +15,9 @@ from orchestrator.cases.networks.unit_row import DoubtOfRecord
 
 GRID_FORMING_RECORDS = REGFM_A1_RECORDS | REGFM_B1_RECORDS
 
-KNOWN_RECORDS = DYR_RECORDS | GRID_FORMING_RECORDS | STATIC_VAR_RECORDS | PLANT_RECORDS
+OTHER_RECORDS = STATIC_VAR_RECORDS | DISTRIBUTED_RECORDS
+
+KNOWN_RECORDS = DYR_RECORDS | GRID_FORMING_RECORDS | PLANT_RECORDS | OTHER_RECORDS
 ON_SHAFT = ("aerodynamics", "pitch", "torque")
 """Kinds of records of a wind turbine that act on its shaft."""
 

@@ -1,0 +1,1 @@
+"""Distributed generation behind one bus: WECC's DER_A."""
