@@ -59,6 +59,7 @@ def declare_fault_outputs(m: ModelBuilder, bus: str, current: Phasor) -> None:
 def _declare_values(
     m: ModelBuilder, bus: str, least: float, most: float
 ) -> tuple[Expr, Expr, Expr]:
+    """Declare R, X and the switch; where X may be negative R may be, as equivalents of reduced networks are."""
     with m.scope(f"{bus}.fault"):
         return (
             m.parameter(
@@ -67,7 +68,7 @@ def _declare_values(
                 "pu",
                 f"Resistance of a fault at {bus}",
                 base=SYSTEM_BASE,
-                minimum=0,
+                minimum=0 if least > 0 else None,
                 tunable=True,
             ),
             m.parameter(

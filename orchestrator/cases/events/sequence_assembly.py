@@ -137,16 +137,29 @@ class SequenceAssembly:
             if not own:
                 continue
             network.add_to_earth(bus, half / square)
-            if not far and half:
+            if not far and half and not (is_changed and self.changed.at is not None):
                 network.add_to_earth(bus, 1 / (z + 1 / half) / square)
-        if not all(closed) or (is_changed and self.changed.at is None):
-            return
         if is_changed and self.changed.at is not None:
-            at = self.changed.at
-            network.add_series(branch.from_bus, FAULT, at * z, ratio)
-            network.add_series(FAULT, branch.to_bus, (1 - at) * z)
+            self._add_split(network, branch, z, closed, ratio)
+            return
+        if not all(closed) or is_changed:
             return
         network.add_series(branch.from_bus, branch.to_bus, z, ratio)
+
+    def _add_split(
+        self,
+        network: SequenceNetwork,
+        branch: FlowLine,
+        z: complex,
+        closed: tuple[bool, ...],
+        ratio: complex,
+    ) -> None:
+        """Add both parts of a line with a fault along it, as far as its ends are closed."""
+        at = self.changed.at or 0.0
+        if closed[0]:
+            network.add_series(branch.from_bus, FAULT, at * z, ratio)
+        if closed[1]:
+            network.add_series(FAULT, branch.to_bus, (1 - at) * z)
 
     def _zero_line(self, branch: FlowLine, line: Line) -> ZeroLine:
         known = self.data.lines.get(line.name)

@@ -23,6 +23,9 @@ from orchestrator.systems.coupling import events as coupled
 from orchestrator.systems.coupling.events import Event, FaultKind
 
 _SHOWN = 4  # elements that a question names
+_OPEN = (
+    100.0  # reactance of a line [pu, 100 MVA] that carries nothing: the most that a network takes
+)
 
 _ASSUMED = {
     "line_z0": f"the zero-sequence impedance is taken as {usual.LINE_Z0:g} times that of the positive sequence",
@@ -68,8 +71,8 @@ def solve_unbalanced(
                 event = solver.solved(event, values, where)
             except InputError as error:
                 draft.note(where, str(error))
-        found[k] = event
-        values.update(event.changes().get(draft.grid or "", {}))
+        found[k] = solver.as_opened(event)
+        values.update(found[k].changes().get(draft.grid or "", {}))
     draft.found.questions += solver.questions()
     return [(found[k], where) for k, (_, where) in enumerate(events)]
 
@@ -89,7 +92,17 @@ class _Solver:
         self._assumed: dict[str, list[str]] = {}
         self._asked: list[Problem] = []
         self._turned: list[str] = []
+        self._whole: set[str] = (
+            set()
+        )  # lines that open with all phases, as nothing else is left of them
         self._where = ""
+
+    def as_opened(self, event: Event) -> Event:
+        """Return a pole's closing, or that of the whole line where the whole line has opened."""
+        if not isinstance(event, coupled.PoleSwitching) or event.line not in self._whole:
+            return event
+        self._whole.discard(event.line)
+        return coupled.LineSwitching(event.time, event.component, event.line, True)
 
     def solved(self, event: Event, values: Mapping[str, object], where: str) -> Event:
         """Return an event with R and X of the positive sequence."""
@@ -124,9 +137,18 @@ class _Solver:
         )
         z = _parallel(negative, zero)
         self._keep(event, event.line, "open pole", (negative, zero, z), found)
-        if not _is_finite(z):
-            return coupled.LineSwitching(event.time, event.component, event.line, False)
-        return replace(event, R=own[0].real + z.real, X=own[0].imag + line.X_C + z.imag)
+        R, X = own[0].real + z.real, own[0].imag + line.X_C + z.imag
+        if _is_finite(z) and abs(complex(R, X)) < _OPEN:
+            return replace(event, R=R, X=X)
+        self._whole.add(event.line)
+        text = (
+            f"with one phase of {event.line} open its other phases carry next to nothing (Z2 = "
+            f"{_words(negative)}, Z0 = {_words(zero)} pu between its ends): the whole line opens"
+        )
+        self._asked.append(
+            Problem(self._where, text, topic=QuestionTopic("an open pole", event.line))
+        )
+        return coupled.LineSwitching(event.time, event.component, event.line, False)
 
     def _assembled(
         self, values: Mapping[str, object], changed: Changed, kind: FaultKind, place: str
@@ -222,6 +244,10 @@ def _parallel(one: complex, other: complex) -> complex:
     if not _is_finite(one) or not _is_finite(other):
         return other if not _is_finite(one) else one
     return one * other / (one + other)
+
+
+def _words(z: complex) -> str:
+    return f"{z.real:.4g}{z.imag:+.4g}j" if _is_finite(z) else "none"
 
 
 def _is_finite(z: complex) -> bool:

@@ -12,7 +12,13 @@ from fmus.grid.network import OPEN_CHARGING
 from orchestrator.cases.case import load_case
 from orchestrator.cases.forcing import event_of
 from orchestrator.core.errors import CaseError, InputError
-from orchestrator.systems.coupling.events import LineEndSwitching, LineFault, PoleSwitching
+from orchestrator.core.options import Option
+from orchestrator.systems.coupling.events import (
+    LineEndSwitching,
+    LineFault,
+    LineSwitching,
+    PoleSwitching,
+)
 from orchestrator.systems.coupling.master import Master
 
 RING = """\
@@ -118,12 +124,13 @@ class Phases:
         ):
             self.at(row, column, sign * y)
 
-    def add_lines(self, split=None, open_phase=None):
+    def add_lines(self, split=None, open_phase=None, *, open_at_from=False):
         for name, (one, other, z) in LINES.items():
             for bus in (one, other):
                 self.at(bus, bus, of_sequences(0.5j * B0_B1 * B1, 0.5j * B1, 0.5j * B1))
             if split is not None and split[0] == name:
-                self.series(one, 3, split[1] * z)
+                if not open_at_from:
+                    self.series(one, 3, split[1] * z)
                 self.series(3, other, (1 - split[1]) * z)
             else:
                 self.series(one, other, z, name == open_phase)
@@ -315,6 +322,31 @@ def test_a_short_circuit_of_one_phase_has_pandapowers_current(tmp_path):
     assert net.res_bus_sc.ikss_ka.iloc[2] == pytest.approx(ikss, rel=1e-3)
 
 
+def test_a_pole_of_a_line_that_feeds_nothing_opens_the_line(tmp_path):
+    base = RING.replace(
+        "lines.l12", 'lines.l34 = { from = "b3", to = "b4", X = 0.02 }\nlines.l12', 1
+    )
+    text = '[[events]]\ntype = "line_fault"\ntime = "0.1 s"\nline = "l34"\nat = 0.5\nkind = "1-phase"\n'
+    ready = prepared(
+        tmp_path, text + 'duration = "50 ms"\nopens = "pole"\nreclose_after = "100 ms"\n', base
+    )
+    *_, opened, closed = ready.events
+    assert (opened.line, opened.connected, closed.connected) == ("l34", False, True)
+    assert isinstance(opened, LineSwitching)
+    assert isinstance(closed, LineSwitching)
+    assert [q for q in ready.questions if "the whole line opens" in str(q)]
+
+
+def test_a_fault_on_a_line_that_is_open_at_one_end_is_that_of_three_phases(tmp_path):
+    trip = '[[events]]\ntype = "line_trip"\ntime = "50 ms"\nline = "l31"\nat = "b3"\n'
+    fault = '[[events]]\ntype = "line_fault"\ntime = "0.1 s"\nline = "l31"\nat = 0.4\nR = 0.01\n'
+    ready = prepared(tmp_path, trip + fault + 'kind = "1-phase"\n')
+    v, reference = compared(ready, 0.102)
+    reference.add_lines(split=("l31", 0.4), open_at_from=True)
+    reference.fault(3, "1-phase", 0.01)
+    assert v == pytest.approx(reference.positive()[:3], rel=1e-3)
+
+
 @pytest.mark.parametrize(
     ("text", "keys"),
     [
@@ -331,7 +363,7 @@ def test_a_short_circuit_of_one_phase_has_pandapowers_current(tmp_path):
     ],
 )
 def test_faults_in_words(text, keys):
-    table = event_of("fault", text)
+    table = event_of(Option.FAULT, text)
     assert {key: getattr(table, key) for key in keys} == keys
 
 
@@ -347,4 +379,4 @@ def test_faults_in_words(text, keys):
 )
 def test_faults_in_words_that_are_none(text, words):
     with pytest.raises(InputError, match=words):
-        event_of("fault", text)
+        event_of(Option.FAULT, text)
