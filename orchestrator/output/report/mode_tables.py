@@ -80,7 +80,7 @@ def mode_shifts(shifts: Iterable[tuple[str, str, float, float]]) -> ShownTable:
     steps = sorted({step for by_step in found.values() for step in by_step})
     rows = [[*key, *(f"{by_step[step]:.1e}" for step in steps)] for key, by_step in found.items()]
     return ShownTable(
-        "Shift of the electromechanical mode by the communication step [rad/s]",
+        "How far each communication step moves the electromechanical mode [rad/s]",
         ["Scenario", "Schedule", *(f"{1e6 * step:g} µs" for step in steps)],
         rows,
         left=2,

@@ -22,9 +22,9 @@ def trajectories(samples: Samples) -> Table:
     """The ends of each trajectory, its least and its most damping, and its least similarity from point to point.
 
     The table shows the trajectories with a name, or all trajectories if the case names no mode."""
-    title = f"Trajectories over {', '.join(axis_label(axis) for axis in samples.axes)}"
+    title = f"Each mode over {', '.join(axis_label(axis) for axis in samples.axes)}"
     table = make_table(
-        title, "Mode", "f [Hz]", "Damping [%]", "Least [%]", "Most [%]", "Points", "Similarity"
+        title, "Mode", "f [Hz]", "Damping [%]", "Least [%]", "Most [%]", "Points", "Alike"
     )
     anything = any(t.carries for s in samples.result.scenarios for t in s.trajectories)
     for sweep in samples.result.scenarios:
@@ -47,6 +47,10 @@ def trajectories(samples: Samples) -> Table:
                 f"{min(alike):.2f}" if alike else "–",
             )
         table.add_section()
+    table.caption = (
+        "Alike: the least likeness of the mode's shape from point to point; 1 is the same."
+    )
+    table.caption_justify = "left"
     return table
 
 
@@ -145,8 +149,8 @@ def remarks(samples: Samples) -> list[str]:
     texts += [f"… and {more} more beginnings, marked 'broken' in sweep.csv"] if more > 0 else []
     if result.refined and not result.limits:
         texts.append(
-            f"{counted(result.refined, 'point')} between those of the grid served to recognise modes "
-            "(where, is marked 'refined' in sweep.csv)"
+            f"{counted(result.refined, 'point')} between the values asked for served to recognise modes "
+            "('refined' in sweep.csv)"
         )
     return [*texts, *warned(samples)]
 

@@ -65,7 +65,7 @@ def test_a_named_mode_is_followed_through_a_crossing(gfor, case, tmp_path):
     out = tmp_path / "out"
     code, text, err = gfor(case, "--vary", "a1.gain=3:12:7", "--workers", 1, "--out", out)
     assert (code, err) == (0, "")
-    assert "Trajectories over a1.gain [1/s]" in text
+    assert "Each mode over a1.gain [1/s]" in text
     assert (
         f"14 points computed. Results in {out}: sweep.nc, sweep.csv, cells.json, trajectories.png"
         in text
@@ -341,7 +341,7 @@ def test_points_in_between_resolve_what_one_step_cannot(gfor, case, tmp_path):
     )
     code, out, err = gfor(*arguments)
     assert code == 0
-    assert "between those of the grid served to recognise modes" in err
+    assert "between the values asked for served to recognise modes" in err
     assert "0 points computed" in out
 
 
