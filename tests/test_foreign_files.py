@@ -2,6 +2,7 @@
 
 import ast
 import os
+import pickle
 import sys
 import zipfile
 from pathlib import Path
@@ -12,7 +13,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.cases.form.csv_rows import rows_of
 from orchestrator.cases.networks.psse.dyr_records import read_dyr
 from orchestrator.cases.networks.psse.records import read_records
-from orchestrator.cases.networks.source_changes import Changes
+from orchestrator.cases.networks.source_changes import Changes, Remark
 from orchestrator.core import foreign_files
 from orchestrator.core.errors import CaseError, InputError
 from orchestrator.core.foreign_files import check_regular, one_line, read_bytes, read_text, visible
@@ -272,6 +273,16 @@ def test_what_a_networks_source_calls_its_elements_is_shown_in_one_line():
     changes.note("L1\nUNSTABLE\x1b[2K", "held")
     (problem,) = changes.listed()
     assert str(problem) == "grid.zip, element L1\\nUNSTABLE\\x1b[2K: held"
+
+
+def test_changes_are_of_one_kind_by_what_is_said_of_them_and_not_by_their_figures():
+    changes = Changes("own.raw")
+    for line, power in ((4, 1.5), (7, 20.0)):
+        changes.note(line, Remark(f"draws GL = {power:g} MW at 'B{line}'", "a shunt that draws"))
+    changes.note(9, "IDE = 3: held at its own voltage, as 'B9' is")
+    kinds = [problem.topic.kind for problem in changes.listed()]
+    assert kinds == ["a shunt that draws"] * 2 + ["IDE = 3: held at its own voltage, as 'B9' is"]
+    assert pickle.loads(pickle.dumps(Remark("x 5", "x"))).kind == "x"
 
 
 def test_names_of_an_ssp_are_shown_in_one_line_and_its_values_stay(tmp_path):

@@ -35,7 +35,9 @@ _LEAST_LIMIT = 0.1  # limit of the current [pu, S_n]
 _LEAST_REACTANCE = 0.01  # [pu, S_n]
 
 
-def approximation(records: Mapping[str, Mapping[str, float]]) -> tuple[dict[str, float], list[str]]:
+def approximation(
+    records: Mapping[str, Mapping[str, float]],
+) -> tuple[dict[str, float], dict[str, str]]:
     """Parameters of `gfl_phasor`, and what they leave out.
 
     Around an operating point with constant references, with v the voltage's magnitude: REECA1 gives δi_p = −i_p·δv/
@@ -43,7 +45,7 @@ def approximation(records: Mapping[str, Mapping[str, float]]) -> tuple[dict[str,
     Tiq besides, or with QFLAG = 1 the integrator Kvi/s, which is 1/(s·τ·X_s).
 
     ``records``: of one machine, REGCA1 and REECA1 or REECB1: values by field, by the record's name. Returned are values
-    by parameter, and one text for each thing that is replaced or left out."""
+    by parameter, and one text for each thing that is replaced or left out, by its kind, which has no figure."""
     electrical = next((name for name in records if name != CONVERTER), None)
     if electrical is None or CONVERTER not in records:
         missing = CONVERTER if electrical else "REECA1 or REECB1"
@@ -52,11 +54,12 @@ def approximation(records: Mapping[str, Mapping[str, float]]) -> tuple[dict[str,
         )
     converter, control = records[CONVERTER], records[electrical]
     _check_modes(electrical, control)
-    texts: list[str] = []
+    texts: dict[str, str] = {}
 
     def at_least(least: float, value: float, name: str) -> float:
         if value < least:
-            texts.append(f"{name} = {value:g} becomes {least:g}, the least that the model takes")
+            text = f"{name} = {value:g} becomes {least:g}, the least that the model takes"
+            texts[f"{name} is raised"] = text
         return max(least, value)
 
     slow = control["Trv"] + converter["Tg"]
@@ -81,14 +84,13 @@ def approximation(records: Mapping[str, Mapping[str, float]]) -> tuple[dict[str,
         used.add("Tiq")
         values["reactive_power.tau"] = at_least(_SHORTEST, slow + control["Tiq"], "Trv + Tg + Tiq")
         if control["PFFLAG"]:
-            texts.append("PFFLAG = 1: the reactive power is held, and not the power factor")
-    texts.append(
+            texts["PFFLAG"] = "PFFLAG = 1: the reactive power is held, and not the power factor"
+    texts["PLL"] = (
         "a PLL of its own (pll.f_0), which REGCA1 does not have: there the current follows the angle at once"
     )
     for name, given in records.items():
-        texts.append(
-            f"not taken over from {name}: {', '.join(field for field in given if field not in used)}"
-        )
+        left = ", ".join(field for field in given if field not in used)
+        texts[name] = f"not taken over from {name}: {left}"
     return values, texts
 
 

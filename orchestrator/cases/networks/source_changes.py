@@ -1,13 +1,37 @@
 """Contents of a network's source that our network has in another form, or not at all: listed, by kind."""
 
-import re
 from collections import defaultdict
+from typing import Self
 
 from orchestrator.core.errors import Problem, QuestionTopic
 from orchestrator.core.foreign_files import one_line
 
-_OWN = re.compile(r"""'[^']*'|[^\s:,;()]*\d[^\s:,;()]*""")
-"""Names and figures of our own sentence on a record: what differs between records that are changed in the same way."""
+
+class Remark(str):
+    """A sentence on a record, with the kind of those that differ only in the names and figures of their records.
+
+    Parameters
+    ----------
+    text
+        The sentence.
+    kind
+        The same for all records that are changed in the same way.
+    """
+
+    kind: str
+
+    def __new__(cls, text: str, kind: str) -> Self:
+        remark = super().__new__(cls, text)
+        remark.kind = kind
+        return remark
+
+    def __getnewargs__(self) -> tuple[str, str]:  # type: ignore[override]  # str has one argument
+        return str(self), self.kind
+
+
+def kind_of(text: str) -> str:
+    """Return the kind of a sentence; one without names and figures is its own."""
+    return text.kind if isinstance(text, Remark) else text
 
 
 class Changes:
@@ -27,7 +51,7 @@ class Changes:
             Problem(
                 f"{self._place}, {self._place_of(items)}",
                 text,
-                topic=QuestionTopic(_OWN.sub("#", text)),
+                topic=QuestionTopic(kind_of(text)),
             )
             for text, items in self._items.items()
         ]

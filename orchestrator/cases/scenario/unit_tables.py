@@ -40,7 +40,7 @@ from orchestrator.cases.networks.psse.load_records import recorded_laws, with_re
 from orchestrator.cases.networks.psse.motor_loads import MotorLoad
 from orchestrator.cases.networks.psse.unused_models import unused_models
 from orchestrator.cases.networks.record_use import UseOfRecord
-from orchestrator.cases.networks.source_changes import Changes
+from orchestrator.cases.networks.source_changes import Changes, Remark, kind_of
 from orchestrator.cases.networks.source_ratings import with_needed_ratings
 from orchestrator.cases.networks.unit_row import UnitRow, checked
 from orchestrator.cases.questions.plausibility import question
@@ -318,7 +318,8 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> tuple[list[UnitRow], Sequen
     changes = Changes(str(path))
     for row in rows:
         for line, text in row.replaced:
-            changes.note(line, f"grid-following converter as {row.converter}: {text}")
+            begin = f"grid-following converter as {row.converter}: "
+            changes.note(line, Remark(begin + text, begin + kind_of(text)))
     draft.found.questions += changes.listed()
     phasors = [row for row in rows if row.converter is not None]
     if phasors and not table.generator.endswith(_PHASOR):

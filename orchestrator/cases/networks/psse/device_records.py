@@ -14,6 +14,7 @@ from orchestrator.cases.networks.psse.records import NODES, RawFile, Record, ele
 from orchestrator.cases.networks.psse.two_terminal import TwoTerminal
 from orchestrator.cases.networks.psse.unknown_devices import UnknownDevice
 from orchestrator.cases.networks.psse.vsc_lines import Converter, VscLine
+from orchestrator.cases.networks.source_changes import Remark
 
 _KILO = 1000.0
 _NO_LIMIT = 9999.0  # Mvar by which PSS/E says that a converter has no limit
@@ -69,14 +70,20 @@ def read_devices(raw: RawFile, left_out: Collection[str], places: Places) -> Fou
             missing = [bus for bus in _buses(raw, section, lines) if places.standing(bus) is None]
             if missing:
                 named = ", ".join(map(str, missing))
-                text = f"not used: bus {named} is not in the file, or out of service"
+                text = Remark(
+                    f"not used: bus {named} is not in the file, or out of service",
+                    "a device without a bus",
+                )
                 unused[section, k] = text
                 remarks.append((record.line, text))
                 continue
             found.append(read(raw, lines, places))
             own = _identity(found[-1])
             if own in seen:
-                text = f"a second {section} of the name {own[1]!r}: both are used, and PSS/E keeps one of a name"
+                text = Remark(
+                    f"a second {section} of the name {own[1]!r}: both are used, and PSS/E keeps one of a name",
+                    f"a second {section} of a name",
+                )
                 remarks.append((record.line, text))
             seen.add(own)
     return FoundDevices(tuple(found), unused, tuple(remarks))

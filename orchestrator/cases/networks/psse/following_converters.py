@@ -7,6 +7,7 @@ from fmus.synchronous_generator.dyr_fields import DyrField
 from orchestrator.cases.form.remedies import replacement_of
 from orchestrator.cases.networks.psse.dyr_records import DynamicRecord, given_values
 from orchestrator.cases.networks.psse.machine_model import MachineModel
+from orchestrator.cases.networks.source_changes import Remark
 from orchestrator.core.errors import InputError
 
 
@@ -56,7 +57,9 @@ def followed(
             f"the converter at bus {own[0].bus} cannot be approximated: {error}; write "
             f"{replacement_of(unit)}, and a converter of ours stands there",
         ) from None
-    replaced = [(own[0].line, text) for text in texts]
+    replaced: list[tuple[int, str]] = [
+        (own[0].line, Remark(text, kind)) for kind, text in texts.items()
+    ]
     for record in (record for record in records if record.name == PLANT and PLANT in left):
         replaced.append(
             (record.line, f"{PLANT} left out, as dyr_leave_out says: the references are constant")

@@ -10,6 +10,7 @@ from orchestrator.cases.networks.psse.records import (
     Record,
     elements,
 )
+from orchestrator.cases.networks.source_changes import Remark
 
 _SWITCHED_SHUNT_STATUS = 32  # first revision with STAT of a switched shunt
 _ENDS: Mapping[str, int] = {
@@ -45,7 +46,10 @@ def with_known_buses(raw: RawFile) -> KnownElements:
             missing = [bus for bus in _buses(section, record) if bus not in buses]
             if missing and (column is None or record.whole(column, "the status", 1)):
                 named = " and ".join(str(bus) for bus in missing)
-                dropped[record.line] = f"not used: the file has no bus {named}"
+                dropped[record.line] = Remark(
+                    f"not used: the file has no bus {named}",
+                    "an element at a bus that the file has not",
+                )
             else:
                 kept += lines
         sections[section] = kept

@@ -8,6 +8,7 @@ import numpy as np
 from orchestrator.cases.form.remedies import without_kinds
 from orchestrator.cases.networks.psse.bridges import Bridges
 from orchestrator.cases.networks.psse.devices import DeviceEnd, HeldDevice, Voltages
+from orchestrator.cases.networks.source_changes import Remark
 from orchestrator.core.errors import InputError
 
 CURRENT = 2  # MDC
@@ -53,8 +54,9 @@ class MultiTerminal(HeldDevice):
                 most = terminal.bridges.most_voltage(abs(voltages[terminal.bus]), abs(current))
                 if abs(kilovolts) > most:
                     text = f"the converter at bus {terminal.bus} needs {abs(kilovolts):.4g} kV"
+                    text += f", and its least angle allows {most:.4g}: its tap is held, where PSS/E moves it"
                     found.append(
-                        f"{text}, and its least angle allows {most:.4g}: its tap is held, where PSS/E moves it"
+                        Remark(text, "a converter that needs more than its least angle allows")
                     )
         return tuple(found)
 

@@ -14,6 +14,7 @@ from orchestrator.cases.networks.psse.records import (
     Record,
 )
 from orchestrator.cases.networks.psse.zero_impedances import is_joining, merged_buses, threshold
+from orchestrator.cases.networks.source_changes import Remark
 
 _VM = 7  # column of the table of buses with the magnitude of the voltage [pu]
 _VA = 8  # column of the table of buses with its angle [degrees]
@@ -102,7 +103,7 @@ def merge_buses(net: RawTables) -> None:
         resistance = record.number(3, "R", 0.0)
         if abs(resistance) > least:
             text = f"zero impedance line: its R of {resistance:g} pu has no effect, as in PSS/E"
-            net.changes.note(record.line, text)
+            net.changes.note(record.line, Remark(text, "a zero impedance line with R"))
     net.lossless = {record.line for record in kept}
     for record in kept:
         text = (

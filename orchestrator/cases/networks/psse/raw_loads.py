@@ -7,6 +7,7 @@ from orchestrator.cases.networks.bus_loads import BusLoads
 from orchestrator.cases.networks.psse.controls import shunt_record
 from orchestrator.cases.networks.psse.raw_network import FileLoad
 from orchestrator.cases.networks.psse.raw_tables import RawTables, is_in_service
+from orchestrator.cases.networks.source_changes import Remark
 from orchestrator.cases.networks.sources import SourceTables
 
 _SMALL_LOSS = 10.0  # MW that a fixed shunt may draw unasked
@@ -68,9 +69,8 @@ def read_shunts(net: RawTables) -> None:
             bus = net.bus(record)
             drawn = complex(record.number(3, "GL", 0.0), record.number(4, "BL", 0.0))
             if drawn.real > max(_SMALL_LOSS, abs(drawn.imag)):
-                net.changes.note(
-                    record.line, f"shunt that draws GL = {drawn.real:g} MW: is it BL, in Mvar?"
-                )
+                text = f"shunt that draws GL = {drawn.real:g} MW: is it BL, in Mvar?"
+                net.changes.note(record.line, Remark(text, "a shunt that draws active power"))
             net.add(bus, 4, drawn)
     status, mode, initial = _SWITCHED[sum(net.raw.revision >= first for first in (32, 35))]
     for record in net.raw.of("switched shunt"):

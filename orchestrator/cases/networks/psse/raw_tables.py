@@ -18,7 +18,7 @@ from orchestrator.cases.networks.psse.records import (
     RawFile,
     Record,
 )
-from orchestrator.cases.networks.source_changes import Changes
+from orchestrator.cases.networks.source_changes import Changes, Remark
 from orchestrator.core.errors import InputError
 
 BUS_COLUMNS = 13  # of `SourceTables.bus`, with the band of voltages
@@ -81,7 +81,10 @@ class RawTables:
         try:
             return record.whole(index, name, 1)
         except InputError:
-            text = f"{name} is {record.text(index)!r}, which is no number: 1 is taken, and it has no effect on the flow"
+            text = Remark(
+                f"{name} is {record.text(index)!r}, which is no number: 1 is taken, and it has no effect on the flow",
+                f"{name} is no number",
+            )
             self.changes.note(record.line, text)
             return 1
 

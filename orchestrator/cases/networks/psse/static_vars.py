@@ -8,6 +8,7 @@ from dataclasses import replace
 from orchestrator.cases.networks.psse.facts_devices import FactsDevice
 from orchestrator.cases.networks.psse.raw_network import Machine
 from orchestrator.cases.networks.psse.raw_tables import RawTables
+from orchestrator.cases.networks.source_changes import Remark
 
 RECORDS = ("CSVGN1",)
 """Names of records that are of a static var compensator at a bus."""
@@ -43,11 +44,11 @@ def units_of_devices(
             continue
         bus = device.sending
         most = device.most_mva if device.most_mva < _NO_LIMIT else net.raw.base_mva
-        net.changes.note(
-            device.line,
+        text = (
             f"FACTS device with a record of its model at bus {bus}: a unit of 0 MW that holds VSET, with that model on "
-            f"{most:g} MVA (SHMX, in the place of a generator's MBASE)",
+            f"{most:g} MVA (SHMX, in the place of a generator's MBASE)"
         )
+        net.changes.note(device.line, Remark(text, "a FACTS device with a record of its model"))
         yield Machine(
             bus,
             of_bus.pop(bus),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from orchestrator.cases.form.remedies import without_kinds
 from orchestrator.cases.networks.psse.bridges import Bridges
 from orchestrator.cases.networks.psse.devices import DeviceEnd, HeldDevice, Voltages
+from orchestrator.cases.networks.source_changes import Remark
 from orchestrator.core.errors import InputError
 
 _CURRENT = 2  # MDC of a line that holds its current
@@ -62,27 +63,28 @@ class TwoTerminal(HeldDevice):
         names = ("the rectifier's firing angle", "the inverter's extinction angle")
         for name, (bus, bridges, kilovolts, _) in zip(names, self._ends(pole), strict=True):
             if not bridges.is_known:
-                found.append(
-                    f"a converter without bridges (NB or EBAS is 0) at bus {bus}: it draws no reactive power"
-                )
+                text = f"a converter without bridges (NB or EBAS is 0) at bus {bus}: it draws no reactive power"
+                found.append(Remark(text, "a converter without bridges"))
                 continue
             angle = bridges.angle(abs(voltages[bus]), pole.current, kilovolts)
             if angle > bridges.most_angle + _BEYOND and pole.current:
-                found.append(
+                text = (
                     f"{name} is {math.degrees(angle):.3g} degrees, beyond its band of "
                     f"{math.degrees(bridges.least_angle):g} to {math.degrees(bridges.most_angle):g}: its tap is held, "
                     "where PSS/E moves it"
                 )
+                found.append(Remark(text, f"{name} beyond its band"))
         return tuple(found)
 
     def _shortfall(self, pole: Pole) -> Iterator[str]:
         """Yield how much less than its order a line carries."""
         order = self._order(pole.rectifier_kv, pole.inverter_kv)
         if pole.current < (1 - _SHORT) * order:
-            yield (
+            text = (
                 f"it carries {pole.rectifier_kv * pole.current:.4g} MW, {pole.current / order:.1%} of its order: "
                 "firing angle at its least; its taps are held, where PSS/E moves them"
             )
+            yield Remark(text, "a DC line that carries less than its order")
 
     def pole(self, voltages: Voltages) -> Pole:
         """Return the line's state at voltages of its buses.

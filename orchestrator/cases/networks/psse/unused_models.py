@@ -13,7 +13,7 @@ from orchestrator.cases.networks.psse.missing_models import (
 )
 from orchestrator.cases.networks.psse.motor_loads import MOTOR_NAMES
 from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
-from orchestrator.cases.networks.source_changes import Changes
+from orchestrator.cases.networks.source_changes import Changes, Remark
 from orchestrator.core.errors import Problem, counted, few
 from orchestrator.core.options import Option
 
@@ -70,13 +70,14 @@ def unused_models(
             )
             where = "DC line" if own[0].line_of_dc else "bus"
             text = f"{name} ({where} {places}) is of no machine and not used: {_MATTER[kind]}"
+            remark = Remark(text + remedy, f"{name} of no machine")
             for record in own:
-                changes.note(record.line, text + remedy)
+                changes.note(record.line, remark)
     for record in _named_in(records, uses, RESTS):
         text = (
             f"{record.name} is {RESTS}: it acts at limits only. Does the machine start within them?"
         )
-        changes.note(record.line, text)
+        changes.note(record.line, Remark(text, RESTS))
     return [*_strays(records, unused), *changes.listed()]
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from orchestrator.cases.form.remedies import without_kinds
 from orchestrator.cases.networks.psse.devices import DeviceEnd, HeldDevice, Hold, Voltages
+from orchestrator.cases.networks.source_changes import Remark
 from orchestrator.core.errors import InputError
 
 # TYPE: out of service, holds the DC voltage, or sets a power
@@ -83,20 +84,22 @@ class VscLine(HeldDevice):
         return tuple(found)
 
     def doubts(self, voltages: Voltages) -> tuple[str, ...]:
-        found = []
+        found = list[str]()
         types = [converter.type for converter in self.converters]
         if types.count(DC_VOLTAGE) != 1 and OUT not in types:
-            found.append(
+            text = (
                 f"no converter, or both, hold the DC voltage (TYPE is {types[0]} and {types[1]}), where PSS/E wants "
                 "one with TYPE = 1: each feeds its DCSET, and nothing links the two"
             )
+            found.append(Remark(text, "a DC voltage that no converter holds, or both"))
         for converter, p in zip(self.converters, self.powers(), strict=True):
             least, most = converter.limits(p, abs(voltages[converter.bus]))
             if least == most and converter.mode == HOLDS_VOLTAGE:
-                found.append(
+                text = (
                     f"the power at bus {converter.bus} takes the whole rating (SMAX, IMAX): it is not reduced, as "
                     "PSS/E does by PWF, and no reactive power is left"
                 )
+                found.append(Remark(text, "a converter without reactive power"))
             if converter.is_remote and converter.mode == HOLDS_VOLTAGE:
                 found.append(
                     "voltage control of another bus: its own is held at the file's voltage"
