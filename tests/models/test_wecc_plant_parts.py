@@ -81,15 +81,15 @@ def modelled(values, **more):
 class AtSource:
     """A device behind the network's impedance."""
 
-    def __init__(self, device):
-        self.device, self.names = device, [v.name for v in device.model.outputs]
+    def __init__(self, device, Z=Z_NETWORK):
+        self.device, self.Z, self.names = device, Z, [v.name for v in device.model.outputs]
 
     def voltage(self, x, source):
         d = self.device
         values = d.model.outputs_function(x, [1.0, 0.0], d.p, d.c)
         y = dict(zip(self.names, *values, strict=True))
         e, Y = complex(y["e_re"], y["e_im"]), complex(y["y_re"], y["y_im"])
-        return (source / Z_NETWORK + e * Y) / (1 / Z_NETWORK + Y)
+        return (source / self.Z + e * Y) / (1 / self.Z + Y)
 
     def rate(self, x, source):
         d, v = self.device, self.voltage(x, source)
