@@ -21,6 +21,7 @@ from orchestrator.cases.networks.data import network_data
 from orchestrator.cases.networks.element_names import ElementNames, names_without_units
 from orchestrator.cases.networks.psse.dyr_records import read_dyr
 from orchestrator.cases.networks.psse.static_vars import RECORDS, Modelled
+from orchestrator.cases.networks.sequence_data import windings_of
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import read_bytes
 
@@ -201,10 +202,28 @@ def _from_table(draft: Draft, grid: ComponentTable, everything: Tables) -> Netwo
             transformers=data.transformers,
             phasors=grid.model == "phasor_grid",
         )
+        _check_groups(draft, network)
         return _with_switches(network, draft, phasors=network.phasors)
     except ValueError as error:
         draft.note_network(draft.given.place("network"), str(error))
         return None
+
+
+def _check_groups(draft: Draft, network: Network) -> None:
+    """Refuse a vector group of a branch that is not there, or with another number of windings."""
+    table = draft.given.case.network
+    windings = dict.fromkeys((x.name for x in network.lines), 2)
+    windings |= dict.fromkeys((x.name for x in network.transformers), 3)
+    for name, group in (table.sequences.groups if table else {}).items():
+        where = draft.given.place("network", "sequences", "groups", name)
+        if name not in windings:
+            hint = close_names(name, windings, "name a branch of the network")
+            draft.note(where, f"there is no branch {name!r}; {hint}")
+        elif len(windings_of(group)) != windings[name]:
+            draft.note(
+                where,
+                f"{group!r} has {len(windings_of(group))} windings, and {name} {windings[name]}",
+            )
 
 
 def _with_switches(network: Network, draft: Draft, *, phasors: bool) -> Network:

@@ -155,4 +155,5 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
 
 
 def _closed(name: str, out: Sequence[str], values: Mapping[str, float | bool]) -> bool:
-    return name not in out and bool(values.get(f"{name}.connected", True))
+    switches = (f"{name}.{x}" for x in ("connected", "from_connected", "to_connected"))
+    return name not in out and all(values.get(switch, True) for switch in switches)

@@ -8,6 +8,7 @@ import pandapower as pp
 import pytest
 from pandapower import shortcircuit as sc
 
+import orchestrator as gfor
 from fmus.grid.network import OPEN_CHARGING
 from orchestrator.cases.case import load_case
 from orchestrator.cases.forcing import event_of
@@ -345,6 +346,30 @@ def test_a_fault_on_a_line_that_is_open_at_one_end_is_that_of_three_phases(tmp_p
     reference.add_lines(split=("l31", 0.4), open_at_from=True)
     reference.fault(3, "1-phase", 0.01)
     assert v == pytest.approx(reference.positive()[:3], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("groups", "words"),
+    [
+        ('groups.l13 = "YNd"', "there is no branch 'l13'; did you mean"),
+        ('groups.l12 = "YNynd"', "'YNynd' has 3 windings, and l12 2"),
+        ('groups.l12 = "YX"', "pattern"),
+    ],
+)
+def test_a_vector_group_of_nothing_is_refused(groups, words, tmp_path):
+    base = RING.replace("line_z0 = 2.5", f"line_z0 = 2.5\n{groups}")
+    with pytest.raises(CaseError, match=words):
+        prepared(tmp_path, "", base)
+
+
+def test_a_screening_takes_an_open_end_as_a_value_of_a_point(tmp_path):
+    trip = '[[events]]\ntype = "line_trip"\ntime = "0.1 s"\nline = "l31"\nat = "b3"\n'
+    prepared(tmp_path, trip)
+    points = {"open": {"grid.l31.from_connected": False}}
+    found = gfor.load(tmp_path / "case.toml").screen(points, outages="l23")
+    items = found.items().set_index("outage")
+    assert items.loc["intact", "status"] == "computed"
+    assert items.loc["l23", "status"] == "computed"  # b3 and its load are lost, not an island
 
 
 @pytest.mark.parametrize(
