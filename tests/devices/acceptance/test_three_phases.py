@@ -114,6 +114,9 @@ def test_a_dip_of_one_phase_is_the_one_of_two_sequence_networks(frame, tmp_path,
     )
     figures = found["unbalanced_dips"].figures
     assert list(figures["phases"].values()) == pytest.approx(current.of_phases, rel=0.015)
+    (lead,) = figures["leads"].values()
+    assert lead == pytest.approx(180 - np.degrees(np.angle(IMPEDANCE)), abs=1.5)
+    assert "asks for 90 to 100° behind a full converter" in found["unbalanced_dips"].evidence
     ripple = sequences.ripple_of(voltage, current)
     assert (figures["ripple_P"], figures["ripple_Q"]) == pytest.approx(
         (ripple.p, ripple.q), rel=0.01
