@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from orchestrator.linear.models.hub_elimination import HubFactors, hub_equations
+from orchestrator.linear.models.hub_elimination import DenseHub, HubFactors, hub_equations
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.shifted_equations import Factors
 
@@ -59,7 +59,8 @@ def count_within(
 
 
 def _of_port(factors: HubFactors) -> complex:
-    matrix, pivots = factors.port
+    assert isinstance(factors.port, DenseHub)
+    matrix, pivots = factors.port.lu
     swaps = int((pivots != np.arange(len(pivots))).sum()) % 2
     return complex(np.log(np.diag(matrix).astype(complex)).sum() + 1j * np.pi * swaps)
 

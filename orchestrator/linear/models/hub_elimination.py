@@ -7,10 +7,14 @@ equations fall apart into small blocks. They are eliminated exactly; what is lef
     | R  T | |y| = |c|
 
 Nothing is neglected. A sparse factorisation of the whole does not see the blocks: its order of elimination, made for
-rows with few entries, lets the hub's rows fill almost everything."""
+rows with few entries, lets the hub's rows fill almost everything.
 
+For a search the dense block may be divided (`divided_hub`): a solution is close then, and exact once it is refined."""
+
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 import scipy.linalg
@@ -19,6 +23,7 @@ import scipy.sparse.linalg as spla
 from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Matrix, Vector
+from orchestrator.linear.models.divided_hub import DividedHub, divide, times
 
 BUSY = 100  # an equation with more unknowns than this belongs to the hub
 # models with a smaller hub keep the sparse factorisation of the whole, and with it their last
@@ -28,7 +33,42 @@ _ACCURATE = 1e-9
 """Largest part of a right side that a solution may leave over. Otherwise σ is too close to an eigenvalue of a block,
 and the whole is factorised instead."""
 
+_NEAR = 1e-4
+"""The same for a solution by a divided hub before it is refined; a correction leaves over about the square of it."""
+
 Places = NDArray[np.int64]
+
+
+class Hub(Protocol):
+    """The dense rest T − σ − R·P⁻¹·Q, factorised, and R itself; right sides have the shape (h, c)."""
+
+    def solve(self, right: Vector) -> Vector: ...
+
+    def solve_adjoint(self, right: Vector) -> Vector: ...
+
+    def taken_in(self, x: Vector) -> Vector:
+        """R·x, for x at the entered places."""
+
+    def given_out(self, y: Vector) -> Vector:
+        """Rᵀ·y at the entered places."""
+
+
+@dataclass(frozen=True)
+class DenseHub:
+    lu: tuple[Matrix, Places]
+    entering: Matrix  # R
+
+    def solve(self, right: Vector) -> Vector:
+        return np.asarray(scipy.linalg.lu_solve(self.lu, right, check_finite=False))
+
+    def solve_adjoint(self, right: Vector) -> Vector:
+        return np.asarray(scipy.linalg.lu_solve(self.lu, right, trans=2, check_finite=False))
+
+    def taken_in(self, x: Vector) -> Vector:
+        return times(self.entering, x)
+
+    def given_out(self, y: Vector) -> Vector:
+        return times(self.entering.T, y)
 
 
 @dataclass(frozen=True)
@@ -60,18 +100,6 @@ class HubEquations:
         entered = np.unique(R.indices)
         return entered, R[:, entered].toarray(order="F")
 
-    def taken_in(self, x: Vector) -> Vector:
-        """R·x, for x of shape (k,) or (k, c), complex or not."""
-        entered, dense = self.into_hub
-        return _times(dense, x[entered])
-
-    def given_out(self, y: Vector) -> Vector:
-        """Rᵀ·y, for y of shape (h,) or (h, c), complex or not."""
-        entered, dense = self.into_hub
-        whole = np.zeros((len(self.rest), *y.shape[1:]), dtype=y.dtype)
-        whole[entered] = _times(dense.T, y)
-        return whole
-
     @cached_property
     def blocks(self) -> tuple[int, Places]:
         """Number of blocks that the rest falls apart into, and the block of each of its unknowns."""
@@ -98,23 +126,58 @@ class HubEquations:
             owner[entered, free[0]] = k
         return colour, owner
 
+    @cached_property
+    def divided(self) -> DividedHub | None:
+        """The hub in halves; None where that is not worth while."""
+        _, Q, _, T = self.quadrants
+        count, block = self.blocks
+        entries = Q.tocoo()
+        rows, columns = block[entries.coords[0]], count + entries.coords[1]
+        ties = sp.coo_array((np.ones(len(rows)), (rows, columns)), shape=2 * (count + len(T),))
+        _, group = sp.csgraph.connected_components(ties, directed=False)
+        entered, dense = self.into_hub
+        owner, taker = group[count:], group[block[entered]]
+        # what no equation of the hub moves belongs to the one that takes most of it
+        still = ~np.isin(taker, owner)
+        taker[still] = owner[np.abs(dense[:, still]).argmax(axis=0)]
+        numbers = np.unique(owner)
+        owner, taker = (np.searchsorted(numbers, of) for of in (owner, taker))
+        return divide(T, dense, self.hub < self.states, owner, taker)
+
     def at(self, sigma: complex) -> "HubFactors | None":
         """Factorise at σ; None where σ is so close to an eigenvalue of a block that the answer would be inaccurate."""
-        P, Q, _, T = self.quadrants
-        at_rest = sp.diags_array((self.rest < self.states).astype(float))
-        try:
-            blocks = spla.splu((P - sigma * at_rest).tocsc())
-        except RuntimeError:
+        found = self._through_blocks(sigma)
+        if found is None:
             return None
-        schur = T.astype(np.result_type(T, sigma), order="F")  # as LAPACK takes it
+        blocks, inside = found
+        schur = self.quadrants[3].astype(np.result_type(inside.dtype, sigma), order="F")
         among = np.flatnonzero(self.hub < self.states)
         schur[among, among] -= sigma
-        inside = self._through_blocks(blocks, Q, schur.dtype)
         self._take_in_columns(inside, schur)
-        port = scipy.linalg.lu_factor(schur, overwrite_a=True, check_finite=False)
-        factors = HubFactors(self, sigma, blocks, inside, port)
-        trial = np.random.default_rng(1).standard_normal(self.states).astype(schur.dtype)
-        return factors if factors.left_over(trial) <= _ACCURATE else None
+        lu = scipy.linalg.lu_factor(schur, overwrite_a=True, check_finite=False)
+        factors = HubFactors(self, sigma, blocks, inside, DenseHub(lu, self.into_hub[1]))
+        return factors if factors.left_over(self._trial(schur.dtype)) <= _ACCURATE else None
+
+    def near_at(self, sigma: complex) -> "HubFactors | None":
+        """The same, by the divided hub where there is one: `refined` is as accurate then, `solve` a little less."""
+        if self.divided is None:
+            return self.at(sigma)
+        found = self._through_blocks(complex(sigma))
+        if found is None:
+            return None
+        blocks, inside = found
+        hub = self.divided.at(sigma, inside[self.into_hub[0]])
+        factors = HubFactors(self, sigma, blocks, inside, hub)
+        trial = self._trial(np.dtype(complex))
+        rough = factors.left_over(trial) <= _NEAR
+        return (
+            factors
+            if rough and factors.left_over(trial, refined=True) <= _ACCURATE
+            else self.at(sigma)
+        )
+
+    def _trial(self, kind: np.dtype) -> Vector:
+        return np.random.default_rng(1).standard_normal(self.states).astype(kind)
 
     def _take_in_columns(self, inside: sp.csc_array, schur: Matrix) -> None:
         """Subtract R·inside in place: a few whole columns of R for each, as no sparse product takes them."""
@@ -126,10 +189,15 @@ class HubEquations:
         schur.real -= (turned.real @ dense.T).T
         schur.imag -= (turned.imag @ dense.T).T
 
-    def _through_blocks(
-        self, blocks: spla.SuperLU, Q: sp.csc_array, kind: np.dtype
-    ) -> sp.csc_array:
-        """P⁻¹·Q, solved for all columns of one colour at once."""
+    def _through_blocks(self, sigma: complex) -> tuple[spla.SuperLU, sp.csc_array] | None:
+        """P − σ factorised, and P⁻¹·Q, solved for all columns of one colour at once."""
+        P, Q = self.quadrants[:2]
+        at_rest = sp.diags_array((self.rest < self.states).astype(float))
+        try:
+            blocks = spla.splu((P - sigma * at_rest).tocsc())
+        except RuntimeError:
+            return None
+        kind = np.result_type(P.dtype, sigma)
         colour, owner = self.colours
         _, block = self.blocks
         entries = Q.tocoo()
@@ -140,7 +208,7 @@ class HubEquations:
         columns_of = owner[block]
         rows, colours = np.nonzero((columns_of >= 0) & (solution != 0))
         places = (rows, columns_of[rows, colours])
-        return sp.coo_array((solution[rows, colours], places), shape=Q.shape).tocsc()
+        return blocks, sp.coo_array((solution[rows, colours], places), shape=Q.shape).tocsc()
 
 
 @dataclass(frozen=True)
@@ -151,51 +219,77 @@ class HubFactors:
     sigma: complex
     blocks: spla.SuperLU
     inside: sp.csc_array
-    port: tuple[Matrix, Places]
+    port: Hub
 
     def solve(self, right: Vector) -> Vector:
         """X with (A − σI)·x = right, shape (n,) or (n, c)."""
-        return self._whole(right)[: self.equations.states]
+        return self._found(right, self._solve)
 
     def solve_adjoint(self, right: Vector) -> Vector:
         """X with (A − σI)ᴴ·x = right, shape (n,) or (n, c)."""
-        e = self.equations
-        b = self._right(right)
-        beside = (self.inside.T @ b[e.rest].conj()).conj()
-        y = scipy.linalg.lu_solve(self.port, b[e.hub] - beside, trans=2, check_finite=False)
-        b[e.rest], b[e.hub] = self.blocks.solve(b[e.rest] - e.given_out(y), "H"), y
-        return b[: e.states]
+        return self._found(right, self._solve_adjoint)
 
-    def left_over(self, right: Vector) -> float:
+    def refined(self, right: Vector) -> Vector:
+        """The same as `solve`, corrected once by what it leaves over of the equations."""
+        return self._found(right, self._refined)
+
+    def refined_adjoint(self, right: Vector) -> Vector:
+        return self._found(right, self._refined_adjoint)
+
+    def left_over(self, right: Vector, *, refined: bool = False) -> float:
         """Return what a solution leaves over of a right side, shape (n,), as a part of its largest element."""
-        e = self.equations
-        found = self._whole(right)
-        rest = _times(e.whole, found)
-        rest[: e.states] -= self.sigma * found[: e.states] + right
+        b = self._right(right[:, None])
+        rest = b - self._product((self._refined if refined else self._solve)(b))
         left = float(np.abs(rest).max() / np.abs(right).max())
         return left if np.isfinite(left) else np.inf
 
-    def _whole(self, right: Vector) -> Vector:
+    def _found(self, right: Vector, solve: Callable[[Vector], Vector]) -> Vector:
+        columns = right if right.ndim == 2 else right[:, None]
+        return solve(self._right(columns))[: self.equations.states].reshape(right.shape)
+
+    def _refined(self, b: Vector) -> Vector:
+        found = self._solve(b)
+        return found + self._solve(b - self._product(found))
+
+    def _refined_adjoint(self, b: Vector) -> Vector:
+        found = self._solve_adjoint(b)
+        return found + self._solve_adjoint(b - self._adjoint_product(found))
+
+    def _solve(self, b: Vector) -> Vector:
         e = self.equations
-        b = self._right(right)
         x = self.blocks.solve(b[e.rest])
-        y = scipy.linalg.lu_solve(self.port, b[e.hub] - e.taken_in(x), check_finite=False)
-        b[e.rest], b[e.hub] = x - self.inside @ y, y
-        return b
+        y = self.port.solve(b[e.hub] - self.port.taken_in(x[e.into_hub[0]]))
+        found = np.empty_like(b)
+        found[e.rest], found[e.hub] = x - self.inside @ y, y
+        return found
+
+    def _solve_adjoint(self, b: Vector) -> Vector:
+        e = self.equations
+        beside = (self.inside.T @ b[e.rest].conj()).conj()
+        y = self.port.solve_adjoint(b[e.hub] - beside)
+        rest = b[e.rest]
+        rest[e.into_hub[0]] -= self.port.given_out(y)
+        found = np.empty_like(b)
+        found[e.rest], found[e.hub] = self.blocks.solve(rest, "H"), y
+        return found
+
+    def _product(self, x: Vector) -> Vector:
+        e = self.equations
+        found = times(e.whole, x)
+        found[: e.states] -= self.sigma * x[: e.states]
+        return found
+
+    def _adjoint_product(self, x: Vector) -> Vector:
+        e = self.equations
+        found = times(sp.csr_array(e.whole.T), x)
+        found[: e.states] -= np.conj(self.sigma) * x[: e.states]
+        return found
 
     def _right(self, right: Vector) -> Vector:
-        b = np.zeros((self.equations.whole.shape[0], *right.shape[1:]), dtype=self.port[0].dtype)
+        kind = np.result_type(self.inside.dtype, right.dtype)
+        b = np.zeros((self.equations.whole.shape[0], right.shape[1]), dtype=kind)
         b[: self.equations.states] = right
         return b
-
-
-def _times(real: Matrix | sp.csr_array, vector: Vector) -> Vector:
-    """A real matrix times vectors, whose real and imaginary parts are taken together, without a complex copy."""
-    if not np.iscomplexobj(vector):
-        return np.asarray(real @ vector)
-    columns = vector.reshape(len(vector), vector.shape[1] if vector.ndim == 2 else 1)
-    product = real @ np.ascontiguousarray(columns).view(float)
-    return np.ascontiguousarray(product).view(complex).reshape(real.shape[0], *vector.shape[1:])
 
 
 def hub_equations(

@@ -15,7 +15,7 @@ import scipy.sparse.linalg as spla
 from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Matrix, Vector
-from orchestrator.linear.models.hub_elimination import HubEquations, hub_equations
+from orchestrator.linear.models.hub_elimination import HubEquations, HubFactors, hub_equations
 
 HELD = " (held)"
 DELAYED = " (delayed"  # in the name of a state that stands for what is on its way over a connection
@@ -36,6 +36,9 @@ class ShiftedSolver:
 
     solve: Callable[[Vector], Vector]
     solve_adjoint: Callable[[Vector], Vector]
+    # the same to the last digits, where the first two are close only
+    refined: Callable[[Vector], Vector]
+    refined_adjoint: Callable[[Vector], Vector]
     # whether both take many vectors as columns, and take hardly longer for them than for one
     takes_many: bool = False
 
@@ -153,11 +156,13 @@ class LinearModel:
 
     def shifted(self, sigma: complex) -> ShiftedSolver:
         """Factorise A − σI once, through the sparse equations; σ must not be an eigenvalue."""
-        factors_of_hub = self._hub.at(sigma) if self._hub else None
+        factors_of_hub = self._hub_at(sigma)
         if factors_of_hub:
             return ShiftedSolver(
                 factors_of_hub.solve,
                 factors_of_hub.solve_adjoint,
+                refined=factors_of_hub.refined,
+                refined_adjoint=factors_of_hub.refined_adjoint,
                 takes_many=self.is_searched_in_blocks,
             )
         n, m = self.G.shape
@@ -173,7 +178,15 @@ class LinearModel:
             right[:n] = b
             return factors.solve(right, transposed)[:n]
 
-        return ShiftedSolver(solve, lambda b: solve(b, "H"))
+        def solve_adjoint(b: Vector) -> Any:
+            return solve(b, "H")
+
+        return ShiftedSolver(solve, solve_adjoint, refined=solve, refined_adjoint=solve_adjoint)
+
+    def _hub_at(self, sigma: complex) -> HubFactors | None:
+        if self._hub is None:
+            return None
+        return self._hub.near_at(sigma) if self.is_searched_in_blocks else self._hub.at(sigma)
 
 
 Indices = NDArray[np.int64]

@@ -1,0 +1,349 @@
+"""A hub that is divided into halves, each of them divided again, with few ties between the two.
+
+A network's answer at one bus to a current at another is a dense matrix, and no two of its elements are alike. But
+whatever one half of a network tells the other goes through the few lines between them: between halves the matrix has a
+rank of some tens, for thousands of rows. Kept as S₁₁, S₂₂ and such products, halves within halves,
+
+    | S₁₁     U₁·V₁ᵀ |
+    | U₂·V₂ᵀ  S₂₂    |
+
+it is factorised and solved with a small part of the dense operations. Ties below a limit are left out, so a solution is
+a close one: `HubFactors.refined` corrects it by the equations themselves."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from orchestrator.core.arrays import Matrix, Vector
+
+LEAST_PART = 128  # equations up to which a part is kept whole
+_NEGLIGIBLE = 1e-9
+"""Singular values of ties below this part of the rows' size are left out. Perturbation leaves noise of 1e-11 there, of
+full rank: ranks were 24 at 1e-9 and 280 at 1e-11 (510 ports of 2,869 buses)."""
+
+# random directions that look for the ties of two halves, to begin with; and how many of them must find nothing
+_DIRECTIONS, _SPARE = 64, 8
+_WORTH = 0.5  # a division that keeps more numbers than this part of the dense matrix is none
+_TURNS = 60  # of the power iteration for the line along which a part is cut
+_FAR_COUNT = 0.25  # exponent of what groups tell each other, where a part is cut
+
+Places = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class _Tie:
+    """What one half takes of the other: left·(hub·y + entered·x), for the other half's y and x."""
+
+    left: Matrix
+    hub: Matrix
+    entered: Matrix
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Some of the hub's equations, which stand together, and the columns of R that belong to them."""
+
+    hub: slice
+    entered: slice
+    # of a part that is kept whole: T and R among its own
+    among: Matrix | None = None
+    taken: Matrix | None = None
+    halves: "tuple[_Part, _Part] | None" = None
+    # first, what the first half takes of the second
+    ties: tuple[_Tie, _Tie] | None = None
+
+    @property
+    def kept(self) -> int:
+        """Numbers that are kept."""
+        own = [self.among, self.taken]
+        for tie in self.ties or ():
+            own += [tie.left, tie.hub, tie.entered]
+        return sum(m.size for m in own if m is not None) + sum(h.kept for h in self.halves or ())
+
+
+@dataclass(frozen=True)
+class DividedHub:
+    """R and T of a hub's equations, in parts; they do not depend on σ.
+
+    ``hub``, ``entered``: order of the hub's equations, and of R's columns, in the parts.
+    ``at_rest``: by equation in that order, whether σ stands in it."""
+
+    hub: Places
+    entered: Places
+    at_rest: NDArray[np.bool_]
+    whole: _Part = field(repr=False)
+
+    def taken_in(self, x: Vector) -> Vector:
+        """R·x, for the entered places' x, shape (k, c)."""
+        found = np.zeros((len(self.hub), x.shape[1]), dtype=x.dtype)
+        _take_in(self.whole, x[self.entered], found)
+        return _put_back(found, self.hub)
+
+    def given_out(self, y: Vector) -> Vector:
+        """Rᵀ·y at the entered places, for y of shape (h, c)."""
+        found = np.zeros((len(self.entered), y.shape[1]), dtype=y.dtype)
+        _give_out(self.whole, y[self.hub], found)
+        return _put_back(found, self.entered)
+
+    def at(self, sigma: complex, inside: sp.csc_array) -> "DividedFactors":
+        """Factorise T − σ − R·inside; ``inside`` has the entered places as rows, and the hub's equations as columns."""
+        ordered = sp.csr_array(inside[self.entered][:, self.hub])
+        return DividedFactors(self, _factors(self.whole, sigma * self.at_rest, ordered))
+
+
+@dataclass(frozen=True)
+class DividedFactors:
+    hub: DividedHub
+    root: "_Whole | _Tied"
+
+    def solve(self, right: Vector) -> Vector:
+        return _put_back(self.root.solve(right[self.hub.hub]), self.hub.hub)
+
+    def solve_adjoint(self, right: Vector) -> Vector:
+        return _put_back(self.root.solve_adjoint(right[self.hub.hub]), self.hub.hub)
+
+    def taken_in(self, x: Vector) -> Vector:
+        return self.hub.taken_in(x)
+
+    def given_out(self, y: Vector) -> Vector:
+        return self.hub.given_out(y)
+
+
+@dataclass(frozen=True)
+class _Whole:
+    """Factors of a part that is kept whole."""
+
+    lu: tuple[Matrix, Places]
+
+    def solve(self, right: Vector) -> Vector:
+        return np.asarray(scipy.linalg.lu_solve(self.lu, right, check_finite=False))
+
+    def solve_adjoint(self, right: Vector) -> Vector:
+        return np.asarray(scipy.linalg.lu_solve(self.lu, right, trans=2, check_finite=False))
+
+
+@dataclass(frozen=True)
+class _Tied:
+    """Factors of two halves and of their ties: S⁻¹ = D⁻¹ − X·K⁻¹·Vᵀ·D⁻¹ with X = D⁻¹·U and K = I + Vᵀ·X."""
+
+    halves: "tuple[_Whole | _Tied, _Whole | _Tied]"
+    cut: int  # equations of the first half
+    X: tuple[Matrix, Matrix]
+    V: tuple[Matrix, Matrix]  # transposed; V₁ᵀ takes what is of the second half
+    lu: tuple[Matrix, Places]
+
+    def solve(self, right: Vector) -> Vector:
+        first, second = self.halves
+        one, other = first.solve(right[: self.cut]), second.solve(right[self.cut :])
+        through = np.concatenate([self.V[0] @ other, self.V[1] @ one])
+        through = scipy.linalg.lu_solve(self.lu, through, check_finite=False)
+        ties = len(self.V[0])
+        return np.concatenate(
+            [one - self.X[0] @ through[:ties], other - self.X[1] @ through[ties:]]
+        )
+
+    def solve_adjoint(self, right: Vector) -> Vector:
+        first, second = self.halves
+        one, other = right[: self.cut], right[self.cut :]
+        through = np.concatenate([self.X[0].conj().T @ one, self.X[1].conj().T @ other])
+        through = scipy.linalg.lu_solve(self.lu, through, trans=2, check_finite=False)
+        ties = len(self.V[0])
+        return np.concatenate(
+            [
+                first.solve_adjoint(one - self.V[1].conj().T @ through[ties:]),
+                second.solve_adjoint(other - self.V[0].conj().T @ through[:ties]),
+            ]
+        )
+
+
+def _factors(part: _Part, shift: Vector, inside: sp.csr_array) -> "_Whole | _Tied":
+    if part.halves is None or part.ties is None:
+        assert part.among is not None
+        assert part.taken is not None
+        own = inside[part.entered][:, part.hub]
+        schur = part.among - _dense_times(part.taken, own)
+        schur[np.diag_indices_from(schur)] -= shift[part.hub]
+        return _Whole(scipy.linalg.lu_factor(schur, overwrite_a=True, check_finite=False))
+    halves = part.halves
+    first, second = (_factors(half, shift, inside) for half in halves)
+    V = [
+        tie.hub - _dense_times(tie.entered, inside[other.entered][:, other.hub])
+        for tie, other in zip(part.ties, reversed(halves), strict=True)
+    ]
+    X = first.solve(part.ties[0].left + 0j), second.solve(part.ties[1].left + 0j)
+    ties = len(V[0])
+    among = np.eye(ties + len(V[1]), dtype=complex)
+    among[:ties, ties:] = V[0] @ X[1]
+    among[ties:, :ties] = V[1] @ X[0]
+    lu = scipy.linalg.lu_factor(among, overwrite_a=True, check_finite=False)
+    cut = part.halves[0].hub.stop - part.hub.start
+    return _Tied((first, second), cut, X, (V[0], V[1]), lu)
+
+
+def _dense_times(dense: Matrix, inside: sp.csr_array) -> Matrix:
+    return np.asarray((inside.T @ dense.T).T)
+
+
+def _take_in(part: _Part, x: Vector, found: Vector) -> None:
+    """Add R·x to what is found, both in the order of the parts."""
+    if part.taken is not None:
+        found[part.hub] += times(part.taken, x[part.entered])
+        return
+    assert part.halves is not None
+    for tie, half, other in zip(part.ties or (), part.halves, reversed(part.halves), strict=True):
+        found[half.hub] += times(tie.left, times(tie.entered, x[other.entered]))
+        _take_in(half, x, found)
+
+
+def _give_out(part: _Part, y: Vector, found: Vector) -> None:
+    """Add Rᵀ·y likewise."""
+    if part.taken is not None:
+        found[part.entered] += times(part.taken.T, y[part.hub])
+        return
+    assert part.halves is not None
+    for tie, half, other in zip(part.ties or (), part.halves, reversed(part.halves), strict=True):
+        found[other.entered] += times(tie.entered.T, times(tie.left.T, y[half.hub]))
+        _give_out(half, y, found)
+
+
+def _put_back(ordered: Vector, order: Places) -> Vector:
+    found = np.empty_like(ordered)
+    found[order] = ordered
+    return found
+
+
+def times(real: Matrix | sp.csr_array, vector: Vector) -> Vector:
+    """A real matrix times vectors, whose real and imaginary parts are taken together, without a complex copy."""
+    if not np.iscomplexobj(vector):
+        return np.asarray(real @ vector)
+    columns = vector.reshape(len(vector), vector.shape[1] if vector.ndim == 2 else 1)
+    product = real @ np.ascontiguousarray(columns).view(float)
+    return np.ascontiguousarray(product).view(complex).reshape(real.shape[0], *vector.shape[1:])
+
+
+def divide(
+    T: Matrix, R: Matrix, at_rest: NDArray[np.bool_], owner: Places, taker: Places
+) -> DividedHub | None:
+    """Divide a hub; None where its parts have too many ties.
+
+    Parameters
+    ----------
+    T, R
+        The hub's equations by its own unknowns and by the entered places, shapes (h, h) and (h, k).
+    at_rest
+        Equations in which σ stands, shape (h,).
+    owner, taker
+        Group of each of the hub's unknowns and of each entered place; what is of one group is not parted.
+    """
+    sizes = np.bincount(owner)
+    leaves = _leaves(_nearness(T, R, owner, taker), sizes)
+    place = np.empty(len(sizes), dtype=np.int64)
+    place[np.concatenate(leaves)] = np.arange(len(sizes))
+    hub, entered = (np.argsort(place[of], kind="stable") for of in (owner, taker))
+    cuts = np.cumsum([0, *map(len, leaves)])
+    edges = [np.searchsorted(place[of][o], cuts) for of, o in ((owner, hub), (taker, entered))]
+    T, R = T[np.ix_(hub, hub)], R[np.ix_(hub, entered)]
+    others = T - np.diag(np.diag(T))
+    scale = np.sqrt((others**2).sum(axis=1) + (R**2).sum(axis=1))
+    builder = _Builder(T, R, np.where(scale > 0, scale, 1.0), edges)
+    whole = builder.part(0, len(leaves))
+    if whole.kept > _WORTH * (T.size + R.size):
+        return None
+    return DividedHub(hub, entered, at_rest[hub], whole)
+
+
+@dataclass(frozen=True)
+class _Builder:
+    T: Matrix
+    R: Matrix
+    scale: Vector  # size of each row
+    edges: list[Places]  # where each leaf begins, among the hub's equations and the entered places
+
+    def part(self, first: int, last: int) -> _Part:
+        """Build the part of some neighbouring leaves; it is kept whole where its halves have too many ties."""
+        hub, entered = (slice(int(e[first]), int(e[last])) for e in self.edges)
+        if last - first > 1:
+            middle = (first + last) // 2
+            one, other = self.part(first, middle), self.part(middle, last)
+            there, back = self._tie(one, other), self._tie(other, one)
+            if there is not None and back is not None:
+                return _Part(hub, entered, halves=(one, other), ties=(there, back))
+        return _Part(hub, entered, self.T[hub, hub].copy(), self.R[hub, entered].copy())
+
+    def _tie(self, taking: _Part, giving: _Part) -> _Tie | None:
+        rows = taking.hub
+        T, R, scale = self.T[rows, giving.hub], self.R[rows, giving.entered], self.scale[rows, None]
+        random, count = np.random.default_rng(0), _DIRECTIONS
+        least = _NEGLIGIBLE * np.sqrt(len(self.scale))
+        while True:
+            count = min(count, *T.shape)
+            tried = (random.standard_normal((m.shape[1], count)) for m in (T, R))
+            answers = sum(m @ turns for m, turns in zip((T, R), tried, strict=True)) / scale
+            basis = np.linalg.qr(answers)[0]
+            across = (basis / scale).T
+            u, sizes, right = scipy.linalg.svd(
+                np.hstack([across @ T, across @ R]), full_matrices=False, check_finite=False
+            )
+            rank = int((sizes > least).sum())
+            if rank <= count - _SPARE:
+                break
+            if 2 * count >= min(T.shape):
+                return None
+            count *= 2
+        right = right[:rank] * sizes[:rank, None]
+        left = scale * (basis @ u[:, :rank])
+        cut = T.shape[1]
+        return _Tie(left, right[:, :cut].copy(), right[:, cut:].copy())
+
+
+def _nearness(T: Matrix, R: Matrix, owner: Places, taker: Places) -> Matrix:
+    """How much each group takes of each other, as parts of what it takes."""
+    groups = int(owner.max()) + 1
+    into, into_taker = (
+        sp.coo_array((np.ones(len(of)), (of, np.arange(len(of)))), shape=(groups, len(of)))
+        for of in (owner, taker)
+    )
+    size = np.abs(T).max(axis=1, keepdims=True, initial=0.0)
+    size = np.maximum(size, np.abs(R).max(axis=1, keepdims=True, initial=0.0))
+    size[size == 0] = 1.0
+    among = (into @ (np.abs(T) / size)) @ into.T + (into @ (np.abs(R) / size)) @ into_taker.T
+    found = np.asarray(among)
+    sums = np.linalg.norm(found, axis=1, keepdims=True)
+    return found / np.where(sums > 0, sums, 1.0)
+
+
+def _leaves(near: Matrix, sizes: Places) -> list[Places]:
+    """Groups of each leaf; as many leaves as a power of two, so that halves have equal depth."""
+    leaves = [np.flatnonzero(sizes > 0)]
+    while max(int(sizes[leaf].sum()) for leaf in leaves) > LEAST_PART and all(
+        len(leaf) > 1 for leaf in leaves
+    ):
+        leaves = [half for leaf in leaves for half in _cut(near, leaf, sizes)]
+    return leaves
+
+
+def _cut(near: Matrix, groups: Places, sizes: Places) -> tuple[Places, Places]:
+    """Cut where the groups tell each other least: along the second eigenvector of what they tell, by their own sums.
+
+    Far groups tell each other little and not nothing; a root makes them count, and the cut follows the network."""
+    tell = near[np.ix_(groups, groups)]
+    tell = (tell + tell.T) ** _FAR_COUNT
+    np.fill_diagonal(tell, 0.0)
+    sums = tell.sum(axis=1)
+    sums[sums == 0] = 1.0
+    root = np.sqrt(sums)
+    first = root / np.linalg.norm(root)
+    tell /= root[:, None] * root
+    along = np.random.default_rng(0).standard_normal(len(groups))
+    for _ in range(_TURNS):
+        along -= first * (first @ along)
+        along += tell @ along
+        along /= np.linalg.norm(along)
+    order = groups[np.argsort(along / root, kind="stable")]
+    reached = np.cumsum(sizes[order])
+    middle = int(np.searchsorted(reached, reached[-1] / 2)) + 1
+    middle = min(max(middle, 1), len(order) - 1)
+    return np.sort(order[:middle]), np.sort(order[middle:])

@@ -1,0 +1,106 @@
+"""A hub in halves against the dense matrix: units along a line, whose halves are tied by one branch."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from orchestrator.linear.models import divided_hub, hub_elimination, linear_model
+from orchestrator.linear.models.hub_elimination import DenseHub
+from orchestrator.linear.models.linear_model import LinearModel
+from orchestrator.linear.spectra.critical_modes import find_critical_modes
+from orchestrator.linear.spectra.modes import find_modes
+from tests.linear.models.test_hub_elimination import STATES, UNITS, system
+
+SIGMA = -0.3 + 5j
+RANGE = (0.5, 1.0)  # Hz
+
+
+def along_a_line(*, noise=0.0):
+    """The voltages are those of a line of buses with an admittance to earth each, in an order that hides the line."""
+    given = system()
+    branches = sp.diags_array([-np.ones(UNITS - 1)] * 2, offsets=[-1, 1]).toarray()
+    answers = np.linalg.inv(branches - np.diag(branches.sum(axis=1)) + 0.05 * np.eye(UNITS))
+    rng = np.random.default_rng(2)
+    answers = 0.02 * (answers + noise * rng.standard_normal(answers.shape))
+    order = rng.permutation(UNITS)
+    K = given.K.toarray()
+    K[:UNITS, UNITS : 2 * UNITS] = answers[np.ix_(order, order)]
+    G = given.G.toarray()
+    for u in range(UNITS):  # each unit takes its own voltage alone
+        G[3 * u : 3 * u + 3, (u + 1) % UNITS] = 0.0
+    return LinearModel(given.F, sp.csr_array(G), given.H, sp.csr_array(K), given.names, None, 0.0)
+
+
+@pytest.fixture(autouse=True)
+def small_parts(monkeypatch):
+    monkeypatch.setattr(hub_elimination, "LEAST_HUB", 50)
+    monkeypatch.setattr(linear_model, "LEAST_IN_BLOCKS", 0)
+    monkeypatch.setattr(divided_hub, "LEAST_PART", 16)
+    monkeypatch.setattr(divided_hub, "_DIRECTIONS", 12)
+    monkeypatch.setattr(divided_hub, "_SPARE", 4)
+
+
+def ranks(part):
+    for tie in part.ties or ():
+        yield tie.left.shape[1]
+    for half in part.halves or ():
+        yield from ranks(half)
+
+
+def test_the_halves_of_a_line_have_few_ties():
+    hub = along_a_line()._hub.divided
+    found = list(ranks(hub.whole))
+    assert len(found) >= 6
+    # one branch, and the network's two states
+    assert max(found) <= 6
+
+
+def test_solutions_are_close_and_refined_ones_are_those_of_the_matrix():
+    model = along_a_line()
+    shifted = model.A - SIGMA * np.eye(STATES)
+    factors = model._hub.near_at(SIGMA)
+    assert not isinstance(factors.port, DenseHub)
+    rng = np.random.default_rng(1)
+    b = rng.standard_normal((STATES, 3)) + 1j * rng.standard_normal((STATES, 3))
+    for solve, matrix, close in (
+        (factors.solve, shifted, 1e-5),
+        (factors.refined, shifted, 1e-10),
+        (factors.solve_adjoint, shifted.conj().T, 1e-5),
+        (factors.refined_adjoint, shifted.conj().T, 1e-10),
+    ):
+        assert np.abs(matrix @ solve(b) - b).max() < close
+        assert np.allclose(solve(b)[:, 1], solve(b[:, 1]), atol=1e-9)
+
+
+def test_critical_modes_are_those_of_the_full_spectrum():
+    model = along_a_line()
+    assert model.is_searched_in_blocks
+    found, full = find_critical_modes(model, *RANGE, 0.1), find_modes(model, *RANGE)
+    wanted = [mode for mode in full if -0.1 <= mode.damping_ratio <= 0.1]
+    assert len(found) == len(wanted) > 5
+    for one, other in zip(found, wanted, strict=True):
+        assert abs(one.eigenvalue - other.eigenvalue) < 1e-10
+        assert dict(one.participation) == pytest.approx(dict(other.participation), abs=1e-6)
+
+
+def test_ties_below_the_noise_of_perturbation_are_left_out_and_the_modes_keep_their_digits():
+    model = along_a_line(noise=1e-9)
+    assert model._hub.divided is not None
+    full = [m for m in find_modes(model, *RANGE) if -0.1 <= m.damping_ratio <= 0.1]
+    found = find_critical_modes(model, *RANGE, 0.1)
+    assert [m.eigenvalue for m in found] == pytest.approx([m.eigenvalue for m in full], abs=1e-10)
+
+
+def test_a_network_that_does_not_fall_into_halves_is_not_divided():
+    assert system()._hub.divided is None
+    assert isinstance(system()._hub.near_at(SIGMA).port, DenseHub)
+
+
+def test_ties_of_weight_that_are_left_out_are_noticed(monkeypatch):
+    monkeypatch.setattr(divided_hub, "_NEGLIGIBLE", 3e-2)
+    model = along_a_line()
+    assert model._hub.divided is not None
+    factors = model._hub.near_at(SIGMA)
+    assert isinstance(factors.port, DenseHub)
+    b = np.ones((STATES, 1), dtype=complex)
+    assert np.allclose(model.A @ factors.solve(b) - SIGMA * factors.solve(b), b, atol=1e-9)
