@@ -55,6 +55,11 @@ class BlockArnoldi:
         self.accuracy: NDArray[np.float64] = np.zeros(0)
         self._coordinates: Matrix = np.zeros((0, 0), dtype=complex)
 
+    @property
+    def count(self) -> int:
+        """Number of vectors that have been taken."""
+        return self._done
+
     def grow(self) -> bool:
         """Take more vectors, and look at the values; False where there are as many as may be."""
         wanted = min(self._most, max(5 * self._width, int(np.ceil(_GROWTH * self._done))))

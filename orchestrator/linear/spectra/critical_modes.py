@@ -5,8 +5,6 @@ eigenvalues nearer than the farthest one found are then known. Discs around a fe
 critical modes: a range of frequencies, from well into instability to a damping that needs no attention."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 import scipy.linalg
@@ -19,14 +17,27 @@ from orchestrator.core.threads import one_thread
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra import modes as spectra
 from orchestrator.linear.spectra.block_arnoldi import MOST, TOLERANCE, BlockArnoldi
+from orchestrator.linear.spectra.cells import Cell
 
 DENSE = 200  # up to this number of states, the full spectrum is cheaper
 # ratio of the ends of the stretches of the range: the region is a wedge, so discs grow upwards
 _STRETCH = 1.35
 
-_SHORT_STRETCH = 1.15
-"""The same where a model has a hub: a factorisation is worth few vectors there, and short stretches keep the crowd of
-better damped modes out of the discs."""
+_WIDENING, _LONGEST = 1.2, 2.5
+"""Where many vectors are taken at once, what of a stretch is not known with `_ENOUGH` of them is searched from other
+points, and the next stretch is longer than the known part by the first factor, up to the second one: crowds of modes
+get short stretches."""
+
+_ENOUGH = 112
+"""Vectors from which on a part of a stretch is enough. Each costs as much as the number of those before it, while one
+more point costs a factorisation and the first eighty."""
+
+_PARTS = (0.95, 0.9, 0.85, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3)
+"""Parts of the radius of a cell's disc for which is asked whether all is known, where it is not in the whole."""
+
+_LEAST_PART = 0.3
+"""What a part must have of the frequencies of its cell with `_ENOUGH` vectors, or more are taken; it is less with more,
+as a crowd is not waited for."""
 
 _AT_A_TIME = (20, 80)
 """Numbers of eigenvalues to find around one point: the first number, and the largest one if the first does not reach
@@ -110,83 +121,50 @@ def nearest_pairs(
     return search.pairs(range(count))
 
 
-@dataclass(frozen=True)
-class _Cell:
-    """A part of the region: Im λ from ``low`` to ``high`` [rad/s], damping ratio from ``least`` to ``most``."""
-
-    low: float
-    high: float
-    least: float
-    most: float
-
-    @property
-    def corners(self) -> list[complex]:
-        return [
-            complex(-ratio / np.sqrt(1 - ratio**2) * omega, omega)
-            for omega in (self.low, self.high)
-            for ratio in (self.least, self.most)
-        ]
-
-    @property
-    def centre(self) -> complex:
-        return complex(np.mean(self.corners))
-
-    @property
-    def radius(self) -> float:
-        return max(abs(corner - self.centre) for corner in self.corners)
-
-    def holds(self, value: complex) -> bool:
-        """Return whether a point lies in the cell, which includes its lower edges but not the upper ones."""
-        return (
-            self.low <= value.imag < self.high
-            and self.least <= spectra.damping_ratio(value) < self.most
-        )
-
-    def halves(self) -> tuple["_Cell", "_Cell"]:
-        """Cut across the longer side."""
-        if self.high - self.low > (self.most - self.least) * self.high:
-            middle = float(np.sqrt(self.low * self.high))
-            return replace(self, high=middle), replace(self, low=middle)
-        between = (self.least + self.most) / 2
-        return replace(self, most=between), replace(self, least=between)
-
-
 def _search(
     model: LinearModel, lowest: float, highest: float, damping: float
 ) -> list[spectra.Mode]:
     """Cover the region with discs. If a disc is too small, find more eigenvalues around its point, or cut the cell."""
     modes: list[spectra.Mode] = []
-    stretch = _SHORT_STRETCH if model.is_searched_in_blocks else _STRETCH
-    edges = np.geomspace(
-        lowest, highest, 1 + int(np.ceil(np.log(highest / lowest) / np.log(stretch)))
-    ).tolist()
-    waiting = [_Cell(low, high, -_UNSTABLE_MARGIN, damping) for low, high in pairwise(edges)]
+    stretch = _STRETCH
+    waiting = [Cell(lowest, highest, -_UNSTABLE_MARGIN, damping)]
     while waiting:
-        cell = waiting.pop()
+        cell, *rest = waiting.pop().highest(stretch)
+        waiting += rest
         if cell.radius < _SMALLEST * abs(cell.centre):
             raise AnalysisError(
                 f"more than {_AT_A_TIME[1]} modes lie at {cell.centre:.4g} rad/s; compute the full spectrum instead"
             )
-        search, values = _searched(model, cell)
-        if values is None:
+        search, known, values = _searched(model, cell)
+        if known is None:
             waiting += cell.halves()
         else:
-            modes += search.modes([k for k, value in enumerate(values) if cell.holds(value)])
+            modes += search.modes([k for k, value in enumerate(values) if known.holds(value)])
+            if model.is_searched_in_blocks:
+                stretch = min(_WIDENING * float(np.exp(known.stretch)), _LONGEST)
+            for left in cell.beside(known):
+                both = waiting[-1].joined(left) if waiting else None
+                if both is not None:
+                    waiting.pop()
+                waiting.append(both or left)
     return modes
 
 
-def _searched(model: LinearModel, cell: _Cell) -> "tuple[Search, NDArray[np.complex128] | None]":
-    """All eigenvalues of a disc around a cell, or None where there are too many. The point is not on one of them."""
+def _searched(
+    model: LinearModel, cell: Cell
+) -> "tuple[Search, Cell | None, NDArray[np.complex128]]":
+    """Search around a cell's centre: the part of the cell in which all is known, None where there is too much, and the
+    eigenvalues around. The point is not on one of them."""
     for moved in (0.0, 0.02, 0.05):
         search = Search(model, cell.centre + moved * cell.radius)
-        values = search.reaching((1 + moved) * cell.radius, cell.holds)
+        known, values = search.covering(cell, (1 + moved) * cell.radius)
         if (
-            values is None
+            known is None
             or not len(values)
             or np.abs(values - search.centre).min() > _BESIDE * abs(search.centre)
         ):
             break
-    return search, values
+    return search, known, values
 
 
 _OFF = 1e-6
@@ -215,7 +193,7 @@ class Search:
 
     def nearest(self, count: int, kept: int = _KEPT) -> NDArray[np.complex128]:
         self._blocks = None
-        nu, self._right = self._arnoldi(self._solver.solve, count, kept)
+        nu, self._right = self._arnoldi(self._solver.refined, count, kept)
         self._values = self._to_lambda(nu)
         self.reach = float(1 / np.abs(nu).min())
         return self._values
@@ -230,6 +208,45 @@ class Search:
         if self._solver.takes_many:
             self._blocks = BlockArnoldi(self._solver.solve, len(self._model.names))
             return self._reaching_in_blocks(self._blocks, radius, wanted)
+        return self._reaching_one_by_one(radius)
+
+    def covering(self, cell: Cell, radius: float) -> tuple[Cell | None, NDArray[np.complex128]]:
+        """Return the part of a cell in which all eigenvalues are known, None where they are too many, and those found.
+
+        ``radius``: distance from ``centre`` within which the whole cell lies [rad/s]."""
+        if not self._solver.takes_many:
+            values = self._reaching_one_by_one(radius)
+            return (None, self._values) if values is None else (cell, values)
+        self._blocks = blocks = BlockArnoldi(self._solver.solve, len(self._model.names))
+        known: list[Cell] = []
+        least = _LEAST_PART * _ENOUGH
+
+        def is_enough(found: BlockArnoldi) -> bool:
+            part = self._known_part(found, cell, radius)
+            if part is None:
+                return False
+            much = found.count >= _ENOUGH and part.stretch * found.count >= least * cell.stretch
+            if not (part is cell or much):
+                return False
+            known.append(part)
+            return True
+
+        values = self._settled(blocks) if _grow(blocks, is_enough) else None
+        return (None, self._values) if values is None else (known[-1], values)
+
+    def _known_part(self, blocks: BlockArnoldi, cell: Cell, radius: float) -> Cell | None:
+        """The largest part of a cell in which all is known; `reach` goes as far."""
+        if self._knows(blocks, radius, cell.holds):
+            return cell
+        for share in _PARTS:
+            part = cell.within(self.centre, share * radius)
+            if part is None:
+                return None
+            if self._knows(blocks, share * radius, part.holds):
+                return part
+        return None
+
+    def _reaching_one_by_one(self, radius: float) -> NDArray[np.complex128] | None:
         count, most = _AT_A_TIME
         while count <= most:
             values = self.nearest(count)
@@ -250,7 +267,7 @@ class Search:
             return []
         if self._blocks is not None:
             return self._pairs_of_blocks(self._blocks, list(chosen))
-        nu, left = self._arnoldi(self._solver.solve_adjoint, len(self._values))
+        nu, left = self._arnoldi(self._solver.refined_adjoint, len(self._values))
         partners = self._to_lambda(nu.conj())
         return [
             (
@@ -264,6 +281,14 @@ class Search:
     def _reaching_in_blocks(
         self, blocks: BlockArnoldi, radius: float, wanted: Callable[[complex], bool]
     ) -> NDArray[np.complex128] | None:
+        if not _grow(blocks, lambda found: self._knows(found, radius, wanted)):
+            return None
+        return self._settled(blocks)
+
+    def _knows(
+        self, blocks: BlockArnoldi, radius: float, wanted: Callable[[complex], bool]
+    ) -> bool:
+        """Return whether all eigenvalues nearer than ``radius`` are known."""
         self.reach = self._farthest(radius)
 
         def may_be_wanted(place: int) -> bool:
@@ -271,8 +296,10 @@ class Search:
             around = value + _FAR * blocks.accuracy[place] * abs(value - self.centre) * _CIRCLE
             return wanted(complex(value)) or any(map(wanted, around.tolist()))
 
-        if not _grow(blocks, lambda found: found.knows_all_beyond(1 / self.reach, may_be_wanted)):
-            return None
+        return blocks.knows_all_beyond(1 / self.reach, may_be_wanted)
+
+    def _settled(self, blocks: BlockArnoldi) -> NDArray[np.complex128] | None:
+        """Eigenvalues up to `reach`; None where one is there so often that there may be more of it."""
         count = int((np.abs(blocks.values) >= 1 / self.reach).sum())
         self._values = self._to_lambda(blocks.values[:count])
         return self._values if blocks.is_complete(count) else None
@@ -289,7 +316,7 @@ class Search:
             raise self._not_converging
         with one_thread():
             left, right = adjoint.vectors(_partners(adjoint, wanted) or ()), blocks.vectors(chosen)
-            moved = self._solver.solve(right)
+            moved = self._solver.refined(right)
             nu, of_left, of_right = scipy.linalg.eig(
                 left.conj().T @ moved, left.conj().T @ right, left=True
             )
