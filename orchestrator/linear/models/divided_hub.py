@@ -24,8 +24,8 @@ _NEGLIGIBLE = 1e-9
 """Singular values of ties below this part of the rows' size are left out. Perturbation leaves noise of 1e-11 there, of
 full rank: ranks were 24 at 1e-9 and 280 at 1e-11 (510 ports of 2,869 buses)."""
 
-# random directions that look for the ties of two halves, to begin with; and how many of them must find nothing
-_DIRECTIONS, _SPARE = 64, 8
+_DIRECTIONS = 64  # random directions that look for the ties of two halves, to begin with
+_SPARE = 8  # how many of them must find nothing
 _WORTH = 0.5  # a division that keeps more numbers than this part of the dense matrix is none
 _TURNS = 60  # of the power iteration for the line along which a part is cut
 _FAR_COUNT = 0.25  # exponent of what groups tell each other, where a part is cut
@@ -35,7 +35,7 @@ Places = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class _Tie:
-    """What one half takes of the other: left·(hub·y + entered·x), for the other half's y and x."""
+    """Ties through which one half takes left·(hub·y + entered·x) of the other, for the other half's y and x."""
 
     left: Matrix
     hub: Matrix

@@ -76,7 +76,7 @@ class Cell:
         return replace(self, low=low, high=high) if low < high else None
 
     def beside(self, part: "Cell") -> Iterator["Cell"]:
-        """What is left of the cell below and above a range of its frequencies."""
+        """Yield the cells below and above a range of its frequencies."""
         if self.low < part.low:
             yield replace(self, high=part.low)
         if part.high < self.high:

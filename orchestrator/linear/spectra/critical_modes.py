@@ -23,10 +23,11 @@ DENSE = 200  # up to this number of states, the full spectrum is cheaper
 # ratio of the ends of the stretches of the range: the region is a wedge, so discs grow upwards
 _STRETCH = 1.35
 
-_WIDENING, _LONGEST = 1.2, 2.5
+_WIDENING = 1.2
 """Where many vectors are taken at once, what of a stretch is not known with `_ENOUGH` of them is searched from other
-points, and the next stretch is longer than the known part by the first factor, up to the second one: crowds of modes
-get short stretches."""
+points, and the next stretch is longer than the known part by this factor: crowds of modes get short stretches."""
+
+_LONGEST = 2.5  # largest ratio of the ends of such a stretch
 
 _ENOUGH = 112
 """Vectors from which on a part of a stretch is enough. Each costs as much as the number of those before it, while one
