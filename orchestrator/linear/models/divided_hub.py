@@ -8,7 +8,7 @@ rank of some tens, for thousands of rows. Kept as S₁₁, S₂₂ and such prod
     | U₂·V₂ᵀ  S₂₂    |
 
 it is factorised and solved with a small part of the dense operations. Ties below a limit are left out, so a solution is
-a close one: `HubFactors.refined` corrects it by the equations themselves."""
+a close one: `HubFactors.solve_exactly` corrects it by the equations themselves."""
 
 from dataclasses import dataclass, field
 
@@ -56,12 +56,12 @@ class _Part:
     ties: tuple[_Tie, _Tie] | None = None
 
     @property
-    def kept(self) -> int:
+    def size(self) -> int:
         """Numbers that are kept."""
         own = [self.among, self.taken]
         for tie in self.ties or ():
             own += [tie.left, tie.hub, tie.entered]
-        return sum(m.size for m in own if m is not None) + sum(h.kept for h in self.halves or ())
+        return sum(m.size for m in own if m is not None) + sum(h.size for h in self.halves or ())
 
 
 @dataclass(frozen=True)
@@ -250,7 +250,7 @@ def divide(
     scale = np.sqrt((others**2).sum(axis=1) + (R**2).sum(axis=1))
     builder = _Builder(T, R, np.where(scale > 0, scale, 1.0), edges)
     whole = builder.part(0, len(leaves))
-    if whole.kept > _WORTH * (T.size + R.size):
+    if whole.size > _WORTH * (T.size + R.size):
         return None
     return DividedHub(hub, entered, at_rest[hub], whole)
 

@@ -39,7 +39,7 @@ _NEAR = 1e-4
 Places = NDArray[np.int64]
 
 
-class Hub(Protocol):
+class HubSolver(Protocol):
     """The dense rest T − σ − R·P⁻¹·Q, factorised, and R itself; right sides have the shape (h, c)."""
 
     def solve(self, right: Vector) -> Vector: ...
@@ -159,7 +159,7 @@ class HubEquations:
         return factors if factors.left_over(self._trial(schur.dtype)) <= _ACCURATE else None
 
     def near_at(self, sigma: complex) -> "HubFactors | None":
-        """The same, by the divided hub where there is one: `refined` is as accurate then, `solve` a little less."""
+        """The same by the divided hub, where there is one: `solve_exactly` is as accurate, `solve` is close."""
         if self.divided is None:
             return self.at(sigma)
         found = self._through_blocks(complex(sigma))
@@ -219,39 +219,39 @@ class HubFactors:
     sigma: complex
     blocks: spla.SuperLU
     inside: sp.csc_array
-    port: Hub
+    port: HubSolver
 
     def solve(self, right: Vector) -> Vector:
         """X with (A − σI)·x = right, shape (n,) or (n, c)."""
-        return self._found(right, self._solve)
+        return self._states_of(right, self._solve)
 
     def solve_adjoint(self, right: Vector) -> Vector:
         """X with (A − σI)ᴴ·x = right, shape (n,) or (n, c)."""
-        return self._found(right, self._solve_adjoint)
+        return self._states_of(right, self._solve_adjoint)
 
-    def refined(self, right: Vector) -> Vector:
+    def solve_exactly(self, right: Vector) -> Vector:
         """The same as `solve`, corrected once by what it leaves over of the equations."""
-        return self._found(right, self._refined)
+        return self._states_of(right, self._exact_solution)
 
-    def refined_adjoint(self, right: Vector) -> Vector:
-        return self._found(right, self._refined_adjoint)
+    def solve_adjoint_exactly(self, right: Vector) -> Vector:
+        return self._states_of(right, self._exact_adjoint)
 
     def left_over(self, right: Vector, *, refined: bool = False) -> float:
         """Return what a solution leaves over of a right side, shape (n,), as a part of its largest element."""
         b = self._right(right[:, None])
-        rest = b - self._product((self._refined if refined else self._solve)(b))
+        rest = b - self._product((self._exact_solution if refined else self._solve)(b))
         left = float(np.abs(rest).max() / np.abs(right).max())
         return left if np.isfinite(left) else np.inf
 
-    def _found(self, right: Vector, solve: Callable[[Vector], Vector]) -> Vector:
+    def _states_of(self, right: Vector, solve: Callable[[Vector], Vector]) -> Vector:
         columns = right if right.ndim == 2 else right[:, None]
         return solve(self._right(columns))[: self.equations.states].reshape(right.shape)
 
-    def _refined(self, b: Vector) -> Vector:
+    def _exact_solution(self, b: Vector) -> Vector:
         found = self._solve(b)
         return found + self._solve(b - self._product(found))
 
-    def _refined_adjoint(self, b: Vector) -> Vector:
+    def _exact_adjoint(self, b: Vector) -> Vector:
         found = self._solve_adjoint(b)
         return found + self._solve_adjoint(b - self._adjoint_product(found))
 

@@ -37,8 +37,8 @@ class ShiftedSolver:
     solve: Callable[[Vector], Vector]
     solve_adjoint: Callable[[Vector], Vector]
     # the same to the last digits, where the first two are close only
-    refined: Callable[[Vector], Vector]
-    refined_adjoint: Callable[[Vector], Vector]
+    solve_exactly: Callable[[Vector], Vector]
+    solve_adjoint_exactly: Callable[[Vector], Vector]
     # whether both take many vectors as columns, and take hardly longer for them than for one
     takes_many: bool = False
 
@@ -161,8 +161,8 @@ class LinearModel:
             return ShiftedSolver(
                 factors_of_hub.solve,
                 factors_of_hub.solve_adjoint,
-                refined=factors_of_hub.refined,
-                refined_adjoint=factors_of_hub.refined_adjoint,
+                solve_exactly=factors_of_hub.solve_exactly,
+                solve_adjoint_exactly=factors_of_hub.solve_adjoint_exactly,
                 takes_many=self.is_searched_in_blocks,
             )
         n, m = self.G.shape
@@ -181,7 +181,9 @@ class LinearModel:
         def solve_adjoint(b: Vector) -> Any:
             return solve(b, "H")
 
-        return ShiftedSolver(solve, solve_adjoint, refined=solve, refined_adjoint=solve_adjoint)
+        return ShiftedSolver(
+            solve, solve_adjoint, solve_exactly=solve, solve_adjoint_exactly=solve_adjoint
+        )
 
     def _hub_at(self, sigma: complex) -> HubFactors | None:
         if self._hub is None:

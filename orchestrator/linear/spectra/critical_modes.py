@@ -17,7 +17,7 @@ from orchestrator.core.threads import one_thread
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra import modes as spectra
 from orchestrator.linear.spectra.block_arnoldi import MOST, TOLERANCE, BlockArnoldi
-from orchestrator.linear.spectra.cells import Cell
+from orchestrator.linear.spectra.region_cells import RegionCell
 
 DENSE = 200  # up to this number of states, the full spectrum is cheaper
 # ratio of the ends of the stretches of the range: the region is a wedge, so discs grow upwards
@@ -128,7 +128,7 @@ def _search(
     """Cover the region with discs. If a disc is too small, find more eigenvalues around its point, or cut the cell."""
     modes: list[spectra.Mode] = []
     stretch = _STRETCH
-    waiting = [Cell(lowest, highest, -_UNSTABLE_MARGIN, damping)]
+    waiting = [RegionCell(lowest, highest, -_UNSTABLE_MARGIN, damping)]
     while waiting:
         cell, *rest = waiting.pop().highest(stretch)
         waiting += rest
@@ -152,8 +152,8 @@ def _search(
 
 
 def _searched(
-    model: LinearModel, cell: Cell
-) -> "tuple[Search, Cell | None, NDArray[np.complex128]]":
+    model: LinearModel, cell: RegionCell
+) -> "tuple[Search, RegionCell | None, NDArray[np.complex128]]":
     """Search around a cell's centre: the part of the cell in which all is known, None where there is too much, and the
     eigenvalues around. The point is not on one of them."""
     for moved in (0.0, 0.02, 0.05):
@@ -194,7 +194,7 @@ class Search:
 
     def nearest(self, count: int, kept: int = _KEPT) -> NDArray[np.complex128]:
         self._blocks = None
-        nu, self._right = self._arnoldi(self._solver.refined, count, kept)
+        nu, self._right = self._arnoldi(self._solver.solve_exactly, count, kept)
         self._values = self._to_lambda(nu)
         self.reach = float(1 / np.abs(nu).min())
         return self._values
@@ -211,7 +211,9 @@ class Search:
             return self._reaching_in_blocks(self._blocks, radius, wanted)
         return self._reaching_one_by_one(radius)
 
-    def covering(self, cell: Cell, radius: float) -> tuple[Cell | None, NDArray[np.complex128]]:
+    def covering(
+        self, cell: RegionCell, radius: float
+    ) -> tuple[RegionCell | None, NDArray[np.complex128]]:
         """Return the part of a cell in which all eigenvalues are known, None where they are too many, and those found.
 
         ``radius``: distance from ``centre`` within which the whole cell lies [rad/s]."""
@@ -219,7 +221,7 @@ class Search:
             values = self._reaching_one_by_one(radius)
             return (None, self._values) if values is None else (cell, values)
         self._blocks = blocks = BlockArnoldi(self._solver.solve, len(self._model.names))
-        known: list[Cell] = []
+        known: list[RegionCell] = []
         least = _LEAST_PART * _ENOUGH
 
         def is_enough(found: BlockArnoldi) -> bool:
@@ -232,10 +234,12 @@ class Search:
             known.append(part)
             return True
 
-        values = self._settled(blocks) if _grow(blocks, is_enough) else None
+        values = self._values_within(blocks) if _grow(blocks, is_enough) else None
         return (None, self._values) if values is None else (known[-1], values)
 
-    def _known_part(self, blocks: BlockArnoldi, cell: Cell, radius: float) -> Cell | None:
+    def _known_part(
+        self, blocks: BlockArnoldi, cell: RegionCell, radius: float
+    ) -> RegionCell | None:
         """The largest part of a cell in which all is known; `reach` goes as far."""
         if self._knows(blocks, radius, cell.holds):
             return cell
@@ -268,7 +272,7 @@ class Search:
             return []
         if self._blocks is not None:
             return self._pairs_of_blocks(self._blocks, list(chosen))
-        nu, left = self._arnoldi(self._solver.refined_adjoint, len(self._values))
+        nu, left = self._arnoldi(self._solver.solve_adjoint_exactly, len(self._values))
         partners = self._to_lambda(nu.conj())
         return [
             (
@@ -284,7 +288,7 @@ class Search:
     ) -> NDArray[np.complex128] | None:
         if not _grow(blocks, lambda found: self._knows(found, radius, wanted)):
             return None
-        return self._settled(blocks)
+        return self._values_within(blocks)
 
     def _knows(
         self, blocks: BlockArnoldi, radius: float, wanted: Callable[[complex], bool]
@@ -299,7 +303,7 @@ class Search:
 
         return blocks.knows_all_beyond(1 / self.reach, may_be_wanted)
 
-    def _settled(self, blocks: BlockArnoldi) -> NDArray[np.complex128] | None:
+    def _values_within(self, blocks: BlockArnoldi) -> NDArray[np.complex128] | None:
         """Eigenvalues up to `reach`; None where one is there so often that there may be more of it."""
         count = int((np.abs(blocks.values) >= 1 / self.reach).sum())
         self._values = self._to_lambda(blocks.values[:count])
@@ -317,7 +321,7 @@ class Search:
             raise self._not_converging
         with one_thread():
             left, right = adjoint.vectors(_partners(adjoint, wanted) or ()), blocks.vectors(chosen)
-            moved = self._solver.refined(right)
+            moved = self._solver.solve_exactly(right)
             nu, of_left, of_right = scipy.linalg.eig(
                 left.conj().T @ moved, left.conj().T @ right, left=True
             )

@@ -64,9 +64,9 @@ def test_solutions_are_close_and_refined_ones_are_those_of_the_matrix():
     b = rng.standard_normal((STATES, 3)) + 1j * rng.standard_normal((STATES, 3))
     for solve, matrix, close in (
         (factors.solve, shifted, 1e-5),
-        (factors.refined, shifted, 1e-10),
+        (factors.solve_exactly, shifted, 1e-10),
         (factors.solve_adjoint, shifted.conj().T, 1e-5),
-        (factors.refined_adjoint, shifted.conj().T, 1e-10),
+        (factors.solve_adjoint_exactly, shifted.conj().T, 1e-10),
     ):
         assert np.abs(matrix @ solve(b) - b).max() < close
         assert np.allclose(solve(b)[:, 1], solve(b[:, 1]), atol=1e-9)

@@ -8,13 +8,13 @@ import scipy.sparse as sp
 from orchestrator.core.errors import AnalysisError
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra import critical_modes
-from orchestrator.linear.spectra.cells import Cell
 from orchestrator.linear.spectra.critical_modes import (
     find_critical_modes,
     nearest_eigenvalue,
     nearest_pairs,
 )
 from orchestrator.linear.spectra.modes import eigenvalues, find_modes
+from orchestrator.linear.spectra.region_cells import RegionCell
 
 RNG = np.random.default_rng(3)
 
@@ -144,7 +144,12 @@ def test_equal_modes_of_equal_units_are_all_found():
 
 
 @pytest.mark.parametrize(
-    "cell", [Cell(1.0, 40.0, 0.02, 0.05), Cell(1.0, 1.1, -0.3, 0.4), Cell(2.0, 2.1, 0.5, 0.9)]
+    "cell",
+    [
+        RegionCell(1.0, 40.0, 0.02, 0.05),
+        RegionCell(1.0, 1.1, -0.3, 0.4),
+        RegionCell(2.0, 2.1, 0.5, 0.9),
+    ],
 )
 def test_two_halves_of_a_cell_are_the_cell(cell):
     rng = np.random.default_rng(1)

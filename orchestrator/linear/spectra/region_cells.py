@@ -9,7 +9,7 @@ from orchestrator.linear.spectra.modes import damping_ratio
 
 
 @dataclass(frozen=True)
-class Cell:
+class RegionCell:
     """A part of the region: Im λ from ``low`` to ``high`` [rad/s], damping ratio from ``least`` to ``most``."""
 
     low: float
@@ -41,7 +41,7 @@ class Cell:
         """Return whether a point lies in the cell, which includes its lower edges but not the upper ones."""
         return self.low <= value.imag < self.high and self.least <= damping_ratio(value) < self.most
 
-    def halves(self) -> tuple["Cell", "Cell"]:
+    def halves(self) -> tuple["RegionCell", "RegionCell"]:
         """Cut across the longer side."""
         if self.high - self.low > (self.most - self.least) * self.high:
             middle = float(np.sqrt(self.low * self.high))
@@ -49,20 +49,20 @@ class Cell:
         between = (self.least + self.most) / 2
         return replace(self, most=between), replace(self, least=between)
 
-    def highest(self, stretch: float) -> "tuple[Cell, ...]":
+    def highest(self, stretch: float) -> "tuple[RegionCell, ...]":
         """Cut off its highest frequencies, up to a ratio, and return them and what is left."""
         if self.high <= stretch * self.low:
             return (self,)
         cut = self.high / stretch
         return replace(self, low=cut), replace(self, high=cut)
 
-    def joined(self, other: "Cell") -> "Cell | None":
+    def joined(self, other: "RegionCell") -> "RegionCell | None":
         """The cell with another one right above it; None where that is elsewhere."""
         if replace(other, low=self.low, high=self.high) != self or self.high != other.low:
             return None
         return replace(self, high=other.high)
 
-    def within(self, centre: complex, radius: float) -> "Cell | None":
+    def within(self, centre: complex, radius: float) -> "RegionCell | None":
         """Return the range of its frequencies in which a disc [rad/s] holds the cell's whole width; None: nowhere.
 
         At Im λ = ω an edge e of the cell is at λ = ω·e, which lies in the disc where |ω·e − centre| ≤ radius."""
@@ -75,7 +75,7 @@ class Cell:
             low, high = max(low, middle - inside**0.5), min(high, middle + inside**0.5)
         return replace(self, low=low, high=high) if low < high else None
 
-    def beside(self, part: "Cell") -> Iterator["Cell"]:
+    def beside(self, part: "RegionCell") -> Iterator["RegionCell"]:
         """Yield the cells below and above a range of its frequencies."""
         if self.low < part.low:
             yield replace(self, high=part.low)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from orchestrator.linear.spectra.cells import Cell
+from orchestrator.linear.spectra.region_cells import RegionCell
 
-CELL = Cell(2.0, 9.0, -0.1, 0.1)
+CELL = RegionCell(2.0, 9.0, -0.1, 0.1)
 
 
 def points(count=400):
@@ -46,5 +46,5 @@ def test_cells_are_cut_and_joined_again():
     assert (upper.high, upper.low) == (9.0, pytest.approx(6.0))
     assert lower.joined(upper) == CELL
     assert upper.joined(lower) is None
-    assert lower.joined(Cell(upper.low, 9.0, 0.0, 0.1)) is None
+    assert lower.joined(RegionCell(upper.low, 9.0, 0.0, 0.1)) is None
     assert CELL.highest(5.0) == (CELL,)
