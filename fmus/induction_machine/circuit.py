@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.symbols import Expr, if_else, logic_and
+from fmus.toolchain.symbols import Expr, Scalar, if_else, logic_and
 
 SOURCE = "P. Kundur, Power System Stability and Control (1994), example 7.1"
 """Where the defaults are from: a motor of one cage, its rating taken as 1 pu."""
@@ -108,13 +108,24 @@ def declare_circuit(m: ModelBuilder) -> Circuit:
     X_1 = part("X1", 0.0678, "Reactance of the first cage", 0.0)
     R_2 = part("R2", 0.0, "Resistance of the second cage; 0, or X2 = 0: there is none", 0.0)
     X_2 = part("X2", 0.0, "Reactance of the second cage", 0.0)
-    nested = kind > 1
+    circuit = Circuit(Phasor(R_A, X_A), X_M, cages_of(X_M, (R_1, X_1), (R_2, X_2), kind > 1))
+    m.require(circuit.subtransient.im, "XA, X1 and X2 leave no subtransient reactance: raise one")
+    return circuit
+
+
+def cages_of(
+    X_M: Expr, first: tuple[Expr, Expr], second: tuple[Expr, Expr], nested: Scalar
+) -> Cages:
+    """Return the cages of their resistances and reactances; the second is there where both of its exceed 0.
+
+    ``nested``: whether the second stands behind the first's reactance."""
+    (R_1, X_1), (R_2, X_2) = first, second
     has_second = logic_and(R_2 > 0, X_2 > 0)
     common = X_M + if_else(nested, X_1, 0)
     L_1, L_2 = X_M + X_1, common + X_2
     determinant = L_1 * L_2 - common**2
     safe = if_else(has_second, determinant, 1)
-    cages = Cages(
+    return Cages(
         (
             if_else(has_second, L_2 / safe, 1 / L_1),
             if_else(has_second, -common / safe, 0),
@@ -131,6 +142,3 @@ def declare_circuit(m: ModelBuilder) -> Circuit:
         ),
         has_second,
     )
-    circuit = Circuit(Phasor(R_A, X_A), X_M, cages)
-    m.require(circuit.subtransient.im, "XA, X1 and X2 leave no subtransient reactance: raise one")
-    return circuit

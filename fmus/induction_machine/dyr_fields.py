@@ -2,8 +2,13 @@
 
 from fmus.synchronous_generator.dyr_fields import records_beside
 
-MOTOR_RECORDS = records_beside(__file__)
+_RECORDS = records_beside(__file__)
+
+MOTOR_RECORDS = {name: record for name, record in _RECORDS.items() if record.kind == "load"}
 """By the beginning of PSS/E's name, which `SUBSYSTEMS` end: the kind ``load`` is of loads, and ``part`` its model."""
+
+INDUCTION_RECORDS = {name: record for name, record in _RECORDS.items() if record.kind != "load"}
+"""By PSS/E's name: records of generators that are induction machines."""
 
 SUBSYSTEMS = ("BL", "OW", "ZN", "AR", "AL")
 """Ends of the names of a load's records, the narrower first: of a load, an owner, a zone, an area, of all loads."""

@@ -6,12 +6,17 @@ import numpy as np
 import pytest
 from scipy.optimize import linear_sum_assignment
 
-from fmus.induction_machine.model import induction_motor_phasor
+from fmus.induction_machine.dyr_fields import INDUCTION_RECORDS
+from fmus.induction_machine.model import induction_generator_phasor, induction_motor_phasor
+from orchestrator.cases.networks.psse.dyr import machine_models
+from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.raw_network import Machine
 from tests.benchmarks import andes_motors as andes
 from tests.models.parts import integrated, refused
 from tests.support.evaluated import Evaluated
 
 MODEL = induction_motor_phasor()
+GENERATOR = induction_generator_phasor()
 OMEGA_B = 2 * np.pi * 60
 DATA = {"RA": 0.013, "XA": 0.067, "XM": 3.8, "R1": 0.009, "X1": 0.17, "H": 0.7, "f_n": 60.0}
 CAGES = {
@@ -247,3 +252,79 @@ def test_a_motor_that_is_cut_off_comes_to_a_standstill_and_not_beyond():
     assert found[-1]["speed"] == pytest.approx(0, abs=1e-6)
     assert found[-1]["p"] == 0
     assert np.isfinite(x).all()
+
+
+# -- by reactances ----------------------------------------------------------------------------------
+
+
+def by_reactances(p):
+    """Reactances and time constants of a circuit: what a test at the open stator would show."""
+    one = p["XM"] * p["X1"] / (p["XM"] + p["X1"])
+    found = {"RA": p["RA"], "Xl": p["XA"], "X": p["XA"] + p["XM"], "Xp": p["XA"] + one}
+    found["Tp"] = (p["XM"] + p["X1"]) / (OMEGA_B * p["R1"])
+    if "R2" in p:
+        found["Xpp"] = p["XA"] + one * p["X2"] / (one + p["X2"])
+        found["Tpp"] = (p["X2"] + one) / (OMEGA_B * p["R2"])
+    return found
+
+
+@pytest.mark.parametrize("power", [0.7, -0.7])
+@pytest.mark.parametrize("cages", ["one", "two beside each other"])
+def test_a_generator_by_its_reactances_is_its_circuit(cages, power):
+    p = DATA | CAGES[cages]
+    values = by_reactances(p) | {"H": p["H"], "f_n": 60.0, "E": 0.0} | AT | {"P_0": power}
+    device = Evaluated(GENERATOR, values)
+    assert not refused(device)
+    assert max(map(abs, device.rates(BUS).values())) < 1e-8
+    slip, found = device.parameters["slip_0"], device.outputs(BUS)
+    s, across = drawn(p, slip, complex(*BUS))
+    assert (s.real, across) == pytest.approx((-power, found["T_e"]))
+    assert (found["p"], found["q"]) == pytest.approx((power, AT["Q_0"]))
+    _, wanted = linearised(p, complex(*BUS), slip, 0.0)
+    ours = np.linalg.eigvals(device.blocks(BUS)[0])
+    distance = np.abs(ours[:, None] - wanted) / (1 + np.abs(wanted))
+    assert max(distance[linear_sum_assignment(distance)]) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("values", "rule"),
+    [
+        ({"X": 0.15}, "X must exceed Xp"),
+        ({"Xl": 0.2}, "Xp must exceed Xl"),
+        ({"Xpp": 0.19, "Tpp": 0.02}, "Xp must exceed Xpp, or write Tpp = 0"),
+        ({"Xpp": 0.05, "Tpp": 0.02}, "Xpp must exceed Xl, or write Tpp = 0"),
+    ],
+)
+def test_reactances_that_are_of_no_circuit_are_refused(values, rule):
+    assert any(rule in text for text in refused(Evaluated(GENERATOR, AT | values)))
+
+
+RECORD = "9 '{name}' 1 1.2 0.02 1.5 4.0 0.2 0.15 0.1 1.0 0.1 1.2 0.4 2 -0.5 /\n"
+
+
+@pytest.mark.parametrize(("name", "power"), [("CIMTR1", -1.0), ("CIMTR3", -1.0)])
+def test_a_generators_record_keeps_its_power_constant(name, power, tmp_path):
+    found = parameters(name, tmp_path)
+    assert "E" not in found
+    device = Evaluated(GENERATOR, found | {"P_0": 0.7})
+    w = device.states["w"]
+    moved = device.rates([1.0, 0.0], device.vector(device.states | {"w": 1.1 * w}))["w"]
+    torque = device.outputs([1.0, 0.0])["T_e"]
+    assert moved == pytest.approx(torque * (1 - 1.1**power) / (2 * 1.5))
+
+
+@pytest.mark.parametrize("name", ["CIMTR2", "CIMTR4"])
+def test_a_motors_record_has_the_torque_of_its_load(name, tmp_path):
+    found = parameters(name, tmp_path)
+    wanted = {"Tp": 1.2, "Tpp": 0.02, "H": 1.5, "X": 4.0, "Xp": 0.2, "Xpp": 0.15, "Xl": 0.1}
+    assert found == wanted | {"E": 2.0, "RA": 0.01}
+
+
+def parameters(name, folder):
+    """Parameters that a record sets, and the resistance of ZSORCE."""
+    assert INDUCTION_RECORDS[name].part == "induction_generator_phasor"
+    (folder / "wind.dyr").write_text(RECORD.format(name=name))
+    machine = Machine(9, "1", 1, 70.0, 1.0, 100.0, 0.01 + 0.15j, -100.0, 100.0)
+    (model,) = machine_models(read_dyr(folder / "wind.dyr"), [machine]).values()
+    assert model.converter == "induction_generator_phasor"
+    return dict(model.parameters)

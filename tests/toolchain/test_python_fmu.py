@@ -67,6 +67,12 @@ ALL_PATHS_OPEN = {
     "static_generation_phasor": {"communication_step": 5e-3, "R": 0.01},
     "csvgn1_phasor": {"communication_step": 5e-3, "R": 0.01},
     "induction_motor_phasor": {"communication_step": 5e-3, "R2": 0.05, "X2": 0.1, "A": 0.5},
+    "induction_generator_phasor": {
+        "communication_step": 5e-3,
+        "RA": 0.01,
+        "Xpp": 0.14,
+        "Tpp": 0.02,
+    },
     "dera1_phasor": {
         "communication_step": 5e-3,
         "R_port": 0.01,

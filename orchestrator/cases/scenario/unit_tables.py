@@ -24,7 +24,6 @@ from orchestrator.cases.form.schema import ComponentTable, UnitsTable
 from orchestrator.cases.form.unusual_value import UnusualValue
 from orchestrator.cases.networks.conversion import Generation
 from orchestrator.cases.networks.data import bus_name
-from orchestrator.cases.networks.load_models import is_open
 from orchestrator.cases.networks.psse.dyr_records import DynamicRecord, read_dyr
 from orchestrator.cases.networks.psse.dyr_units import (
     completed,
@@ -36,7 +35,6 @@ from orchestrator.cases.networks.psse.dyr_units import (
     without_idle_controls,
 )
 from orchestrator.cases.networks.psse.dyr_uses import record_uses
-from orchestrator.cases.networks.psse.load_records import recorded_laws, with_recorded_laws
 from orchestrator.cases.networks.psse.motor_loads import MotorLoad
 from orchestrator.cases.networks.psse.unused_models import unused_models
 from orchestrator.cases.networks.record_use import UseOfRecord
@@ -45,6 +43,7 @@ from orchestrator.cases.networks.source_ratings import with_needed_ratings
 from orchestrator.cases.networks.unit_row import UnitRow, checked
 from orchestrator.cases.questions.plausibility import question
 from orchestrator.cases.scenario.motor_components import motor_components, take_motors
+from orchestrator.cases.scenario.recorded_loads import take_frequency, take_laws
 from orchestrator.core.errors import InputError, Problem, few
 
 UNIT_KINDS = ("sg", "gfor")  # first parts of the names of a unit's generator and converter
@@ -380,7 +379,9 @@ def _account(
         ours=ours,
     )
     motors = take_motors(draft, table, records)
-    taken = _with_recorded_loads(draft, records)
+    left = {name.upper() for name in table.dyr_leave_out}
+    wanted = [record for record in records if record.name not in left]
+    taken = take_laws(draft, wanted) | take_frequency(draft, wanted)
     taken |= {(motor.record.file, motor.record.line) for motor in motors}
     uses = [
         replace(use, use=UseOfRecord.USED, why="", of_no_machine=False)
@@ -394,28 +395,6 @@ def _account(
     among_phasors = table.generator.endswith(_PHASOR)
     draft.found.questions += unused_models(records, uses, said, among_phasors=among_phasors)
     return motors
-
-
-def _with_recorded_loads(
-    draft: Draft, records: Sequence[DynamicRecord]
-) -> frozenset[tuple[str, int]]:
-    """Give the loads the laws of their records, where the case leaves them open; return the places of those records."""
-    data = draft.data
-    if data is None or not is_open(draft.given.case.network):
-        return frozenset()
-    recorded = recorded_laws(records, data.file_loads)
-    draft.data = replace(
-        data,
-        loads=tuple(
-            with_recorded_laws(load, recorded.laws[load.name])
-            if load.name in recorded.laws and load.p_mw >= 0
-            else load
-            for load in data.loads
-        ),
-        recorded_loads=frozenset(recorded.laws),
-    )
-    draft.found.questions += recorded.remarks
-    return recorded.places
 
 
 def _alphas(draft: Draft, table: UnitsTable, rows: Sequence[UnitRow]) -> dict[str, float]:

@@ -7,11 +7,13 @@ from pathlib import Path
 
 from fmus.distributed_generation.dyr_fields import DISTRIBUTED_RECORDS
 from fmus.grid_following.dyr_fields import FIELDS, MODEL
+from fmus.induction_machine.dyr_fields import INDUCTION_RECORDS
 from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
 from fmus.regfm_b1.dyr_fields import REGFM_B1_RECORDS
 from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS, DyrRecord
 from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
+from orchestrator.cases.networks.psse.frequency_records import FREQUENCY_RECORDS
 from orchestrator.cases.networks.psse.load_records import LOAD_RECORDS
 from orchestrator.cases.networks.psse.motor_loads import MOTOR_NAMES
 
@@ -20,6 +22,8 @@ _REGFM = "WECC's specification of REGFM_A1"
 _REGFM_B1 = "WECC's specification of REGFM_B1, in PNNL's script for PSS/E"
 _LOADS = "GridPACK's reader and model"
 _DISTRIBUTED = "WECC's specification of DER_A; fields as PowerSystems.jl lists PSS/E's"
+_INDUCTION = "PowerWorld's guide to PSS/E's machine models"
+_FREQUENCY = "PowerWorld's guide to PSS/E's load models"
 _MOTORS = "PowerWorld's guide to PSS/E's load models, and STEPS' reader"
 _GENERIC = (
     "WECC's generic converters: fields as ANDES and GridPACK read them, diagrams of WECC's guide"
@@ -61,6 +65,14 @@ def known_records() -> list[KnownRecord]:
     found += [
         KnownRecord(name, "load", "load_model", _LOADS, "an exponent other than 0, 1, 2 near v_0")
         for name in LOAD_RECORDS
+    ]
+    found += [
+        KnownRecord(name, "machine", record.part, _INDUCTION, "; ".join(_limits(record)))
+        for name, record in INDUCTION_RECORDS.items()
+    ]
+    found += [
+        KnownRecord(name, "load", "load_model", _FREQUENCY, "r, s not used; no constant impedances")
+        for name in FREQUENCY_RECORDS
     ]
     found += [
         KnownRecord(name, "load", record.part, _MOTORS, "; ".join(_limits(record)))

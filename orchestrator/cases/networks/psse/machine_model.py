@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from fmus.distributed_generation.dyr_fields import DISTRIBUTED_RECORDS
+from fmus.induction_machine.dyr_fields import INDUCTION_RECORDS
 from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
 from fmus.regfm_b1.dyr_fields import REGFM_B1_RECORDS
 from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
@@ -15,7 +16,7 @@ from orchestrator.cases.networks.unit_row import DoubtOfRecord
 
 GRID_FORMING_RECORDS = REGFM_A1_RECORDS | REGFM_B1_RECORDS
 
-OTHER_RECORDS = STATIC_VAR_RECORDS | DISTRIBUTED_RECORDS
+OTHER_RECORDS = STATIC_VAR_RECORDS | DISTRIBUTED_RECORDS | INDUCTION_RECORDS
 
 KNOWN_RECORDS = DYR_RECORDS | GRID_FORMING_RECORDS | PLANT_RECORDS | OTHER_RECORDS
 ON_SHAFT = ("aerodynamics", "pitch", "torque")
@@ -27,6 +28,7 @@ KINDS_OF_CONVERTERS = ("converter", "electrical", "plant", "shaft", *ON_SHAFT)
 SOURCE_IMPEDANCE = {
     "regfm_a1_phasor": ("RL", "XL"),
     "regfm_b1_phasor": ("Re", "XL"),
+    "induction_generator_phasor": ("RA",),
     "REGCB1": ("Re", "Xe"),
     "REGCC1": ("Re", "Xe"),
 }
