@@ -283,6 +283,10 @@ FOR_TYPES = {
 arrows."""
 
 
+LATE = {"pandas", "scipy.optimize", "scipy.signal", "scipy.stats", "xarray"}
+"""Libraries that `core.late` stands in for."""
+
+
 def test_only_libraries_that_come_late_are_imported_for_type_checkers_alone():
     """Any other such import hides an arrow that runs back up, or a module that a start should not wait for."""
     blocks = [
@@ -294,10 +298,7 @@ def test_only_libraries_that_come_late_are_imported_for_type_checkers_alone():
     assert {name for name, _ in blocks} == {
         n for n, tree in modules().items() if "TYPE_CHECKING" in _code_of(tree)
     }
-    hiding = [
-        (name, imported_names(node) - {"pandas", "scipy.optimize", "scipy.signal", "xarray"})
-        for name, node in blocks
-    ]
+    hiding = [(name, imported_names(node) - LATE) for name, node in blocks]
     assert {name.removeprefix("orchestrator.") for name, names in hiding if names} == FOR_TYPES
 
 

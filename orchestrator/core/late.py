@@ -1,4 +1,4 @@
-"""Libraries that are imported where they are first used: pandas, xarray and scipy.optimize take a second, and the
+"""Libraries that are imported where they are first used: pandas, xarray and parts of SciPy take a second, and the
 modes of a case need none of them.
 
 A module that may do without them imports them from here, and defers its annotations (``from __future__ import
@@ -24,11 +24,10 @@ class Late:
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
-    from scipy import optimize, signal
+    from scipy import optimize, signal, stats
 else:
-    pd, xr, optimize, signal = (
-        Late(name) for name in ("pandas", "xarray", "scipy.optimize", "scipy.signal")
-    )
+    pd, xr = (Late(name) for name in ("pandas", "xarray"))
+    optimize, signal, stats = (Late(f"scipy.{name}") for name in ("optimize", "signal", "stats"))
 
 
 def import_xarray_alone() -> None:
@@ -47,4 +46,4 @@ def import_xarray_alone() -> None:
             del sys.modules[name]
 
 
-__all__ = ["import_xarray_alone", "optimize", "pd", "signal", "xr"]
+__all__ = ["import_xarray_alone", "optimize", "pd", "signal", "stats", "xr"]

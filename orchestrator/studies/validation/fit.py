@@ -10,11 +10,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy.stats import qmc
-from scipy.stats import t as student
 
 from orchestrator.core.arrays import Matrix, Numbers
-from orchestrator.core.late import optimize
+from orchestrator.core.late import optimize, stats
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import RecordedEvent
 from orchestrator.studies.validation.parameters import Adjustable, Wanted
@@ -199,7 +197,7 @@ def _trial(
 def _starts(told: Sequence[Adjustable]) -> Iterator[list[Adjustable]]:
     """The parameters as the model has them, and then at other points, spread evenly and always the same."""
     yield list(told)
-    points = qmc.Halton(len(told), seed=1).random(_STARTS - 1)
+    points = stats.qmc.Halton(len(told), seed=1).random(_STARTS - 1)
     for point in points:
         yield [
             replace(one, start=one.start + (2 * part - 1) * _FARTHEST * one.reach)
@@ -329,7 +327,7 @@ def _half_widths(best: _Trial, residuals: Residuals) -> dict[str, float]:
         return {}
     spread = np.sqrt(np.diag(covariance(best.slopes, best.errors, residuals.stretches)))
     free = independent_samples(best.errors, residuals.stretches) - len(spread)
-    quantile = float(student.ppf(0.5 + _SURE / 2, max(free, 3.0)))
+    quantile = float(stats.t.ppf(0.5 + _SURE / 2, max(free, 3.0)))
     later = residuals.hidden_later(best.values)
     shift = np.linalg.lstsq(best.slopes, later, rcond=None)[0]
     gains = np.linalg.lstsq(best.slopes, gain_errors(residuals.stretches, len(later)), rcond=None)[
