@@ -199,28 +199,31 @@ def drive(
     inputs: Numbers,
     step_size: float,
     index: int = 0,
+    late: Numbers | None = None,
 ) -> Numbers:
     """Step a component with one row of inputs after another; its outputs at the end of each step, shape (n, p).
 
-    ``names``: of the inputs and of the outputs; ``inputs``: shape (n, m); ``index``: steps that were made before.
+    ``names``: of the inputs and of the outputs; ``inputs``: shape (n, m); ``index``: steps that were made before;
+    ``late``: inputs with which the outputs are read after each step, where those are not the step's own.
 
     Raises an `AnalysisError` if an output is no finite number, and a `ComponentError` if the FMU refuses a call."""
     outputs = np.empty((len(inputs), len(names[1])))
     for first in range(0, len(inputs), _STRETCH):
         part = slice(first, min(first + _STRETCH, len(inputs)))
         rows = np.ascontiguousarray(inputs[part])
-        _drive_stretch(component, names, (rows, outputs[part]), step_size, index + first)
+        read = None if late is None else np.ascontiguousarray(late[part])
+        _drive_stretch(component, names, (rows, read, outputs[part]), step_size, index + first)
     return outputs
 
 
 def _drive_stretch(
     component: Component,
     names: tuple[Sequence[str], Sequence[str]],
-    rows: tuple[Numbers, Numbers],
+    rows: tuple[Numbers, Numbers | None, Numbers],
     step_size: float,
     index: int,
 ) -> None:
-    inputs, outputs = rows
+    inputs, late, outputs = rows
     into, out = (
         RealBatch(component, names[0], inputs[0]),
         RealBatch(component, names[1], outputs[0]),
@@ -238,6 +241,7 @@ def _drive_stretch(
             out.arguments[1],
             len(names[1]),
             inputs.ctypes.data,
+            None if late is None else late.ctypes.data,
             outputs.ctypes.data,
             index,
             len(inputs),
@@ -269,6 +273,7 @@ def _library() -> Any:
         integer,
         address,
         integer,
+        address,
         address,
         address,
         integer,

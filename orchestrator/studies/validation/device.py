@@ -15,9 +15,10 @@ from orchestrator.core.options import Option
 from orchestrator.devices.fmi.component import Component, RealBatch
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.devices import NO_BUS, PORT, is_controller_alone
-from orchestrator.devices.fmi.instance import open_component
+from orchestrator.devices.fmi.instance import is_ours
 from orchestrator.studies.black_box.bench import drive
 from orchestrator.studies.validation.averaging import averaged
+from orchestrator.studies.validation.instances import InstanceShelf
 from orchestrator.studies.validation.record import Recording
 from orchestrator.systems.coupling.step_awareness import STEP_PARAMETER
 
@@ -26,6 +27,10 @@ _NAMES = (_VOLTAGE, _CURRENT)
 _STARTS = ("P_0", "Q_0", "v_0", "theta_0")
 _STILL = 1e-4  # movement of the current in a round [pu of the rating] at which a device is at rest
 _ROUND = 0.5  # time [s] for which it is looked at
+_SHORT_STEP = 1e-4  # communication step [s] of a coupled run, whose held voltage is late by nothing that matters
+_ROUGH_STEP = (
+    5e-4  # communication step [s] for a first look: half the time of a run in steps of 100 us
+)
 _LONGEST_REST = 20.0  # time [s] after which it is driven, at rest or not
 
 
@@ -35,6 +40,16 @@ class OperatingStart:
 
     voltage: complex
     power: complex
+
+
+class StartRefusedError(InputError):
+    """A device does not take the operating point before the event.
+
+    ``said``: what it takes, without a guess why."""
+
+    def __init__(self, said: str, guess: str) -> None:
+        super().__init__(said + "; " + guess)
+        self.said = said
 
 
 @dataclass(frozen=True)
@@ -62,10 +77,23 @@ class PlayedDevice:
     step_size: float = 1e-4  # communication step [s]
     held: Mapping[str, float] = field(default_factory=dict)  # its other inputs
     isolated: bool | None = None  # as in `open_component`
+    shelf: InstanceShelf = field(default_factory=InstanceShelf, compare=False)
 
     @property
     def path(self) -> Path:
         return self.description.path
+
+    @property
+    def takes_any_step(self) -> bool:
+        """Return whether it runs with any communication step, as our own FMUs do."""
+        return not self.isolated and is_ours(self.path)
+
+    @property
+    def rough(self) -> PlayedDevice:
+        """The same in longer steps, where it takes any: good enough to see what is worth a look."""
+        if not self.takes_any_step or self.step_size >= _ROUGH_STEP:
+            return self
+        return replace(self, step_size=_ROUGH_STEP)
 
     def with_values(self, values: Mapping[str, float | bool]) -> PlayedDevice:
         return replace(self, values={**self.values, **values})
@@ -92,10 +120,11 @@ class PlayedDevice:
     def play(self, recording: Recording, start: OperatingStart) -> Played:
         """Bring it to rest at the operating point, and let the recorded voltage drive it.
 
-        The voltage of a step is that at its begin, as in a coupled run."""
+        The voltage of a step is that at its begin, as in a coupled run. A longer step takes the mean of what such short
+        steps would hold, and its end what the last of them would: that at its begin alone would be late by half of it
+        in what a device integrates, and by all of it in what follows the voltage at once."""
         values = {**self._told_step(), **self._start_values(start), **self.values}
-        component = open_component("device", self.description, isolated=self.isolated)
-        try:
+        with self.shelf.instance(self.description, self.isolated) as component:
             component.setup(0.0, None)
             component.set(values)
             component.enter_initialization_mode()
@@ -105,17 +134,17 @@ class PlayedDevice:
             begin = RealBatch(component, _CURRENT).read().copy()
             before = self._rest(component, at, begin)
             driven = self._driven(component, recording, before)
-        finally:
-            component.close()
         rest = start.voltage * complex(*before[-1]).conjugate() * SYSTEM_BASE_MVA / self.rating
         settled_after = (len(before) - 1) * self.step_size
         return Played(driven, settled_after, rest, still=settled_after < _LONGEST_REST)
 
     def _told_step(self) -> dict[str, float]:
-        """The communication step, for a device whose outputs are for the middle of the next one."""
+        """The communication step, for a device whose outputs are for the middle of the next one.
+
+        No longer one than a coupled run has: what is measured is of its own time."""
         info = self.description.variables.get(STEP_PARAMETER)
         known = info is not None and info.causality == "parameter"
-        return {STEP_PARAMETER: self.step_size} if known else {}
+        return {STEP_PARAMETER: min(self.step_size, _SHORT_STEP)} if known else {}
 
     def _start_values(self, start: OperatingStart) -> dict[str, float]:
         """The power flow's values of a device; those that it does not know are left out."""
@@ -131,14 +160,14 @@ class PlayedDevice:
                 continue
             low, high = info.minimum, info.maximum
             if (low is not None and found[name] < low) or (high is not None and found[name] > high):
-                raise InputError(
-                    f"{self.name}: before the event the recording has {name} = {found[name]:.4g} "
-                    f"pu, and the device takes {low} to {high}; is its rating {self.rating:g} MVA "
-                    "("
+                raise StartRefusedError(
+                    f"{self.name}: before the event the recording has {name} = {found[name]:.4g} pu, and the device "
+                    f"takes {low} to {high}",
+                    f"is its rating {self.rating:g} MVA ("
                     + Option.SET
                     + " S_n=…), and are the recording's units as gfor reads them ("
                     + Option.CHANNEL
-                    + ")?"
+                    + ")?",
                 )
         return {name: value for name, value in found.items() if name in self.description.variables}
 
@@ -159,8 +188,21 @@ class PlayedDevice:
         steps = int(np.ceil(recording.length / self.step_size - 1e-9))
         times: Numbers = np.asarray(self.step_size * np.arange(steps + 1))
         voltage = recording.at(times)
-        rows = np.column_stack([voltage.real, voltage.imag])
-        found = drive(component, _NAMES, rows[:-1], self.step_size, len(before) - 1)
+        held = self._step_voltages(recording, steps)
+        late = _columns(held[:, -1]) if held.shape[1] > 1 else None
+        rows = _columns(held.mean(axis=1))
+        index = len(before) - 1
+        found = drive(component, _NAMES, rows, self.step_size, index, late=late)
         currents = np.concatenate([before[-1:], found]) @ np.array([1.0, 1j])
         power = voltage * currents.conj() * (SYSTEM_BASE_MVA / self.rating)
         return averaged(times, power, recording.average, recording.times, recording.ahead)
+
+    def _step_voltages(self, recording: Recording, steps: int) -> Complex:
+        """The voltages that short steps in each step would hold, shape (steps, short steps in one)."""
+        parts = max(1, int(np.ceil(self.step_size / _SHORT_STEP - 1e-9)))
+        times: Numbers = np.asarray(self.step_size / parts * np.arange(steps * parts))
+        return np.asarray(recording.at(times).reshape(steps, parts))
+
+
+def _columns(values: Complex) -> Numbers:
+    return np.column_stack([values.real, values.imag])
