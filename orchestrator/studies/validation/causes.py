@@ -13,7 +13,8 @@ from orchestrator.core.arrays import Complex, Numbers
 
 _EXPLAINS = 0.75  # part of the squared error beyond the scatter that an explanation takes away
 _MOST_DELAY = 0.25  # longest delay that is looked for [s]
-_DELAYS = 500  # that are tried
+_DELAYS = 100  # that are tried at first
+_BETWEEN = 5  # between two of these, around the best one
 _LEAST_DELAY = 0.002  # [s]
 _LEVELS = 200  # limits of the current that are tried
 _ABOVE = 1.03  # times a limit which the measured current reaches at its most
@@ -97,12 +98,17 @@ def delay_of(
     responses: Responses, without: Responses, intervals: Sequence[float], errors: Errors
 ) -> float | None:
     """The time by which a part of the responses comes later in the recordings [s]; None where none explains them."""
-    trial = np.linspace(-_MOST_DELAY, _MOST_DELAY, _DELAYS + 1)
-    costs = [_squares(errors(later(responses, without, intervals, one))) for one in trial]
-    best = int(np.argmin(costs))
-    delay = float(trial[best])
-    inside = 0 < best < _DELAYS
-    return delay if inside and abs(delay) >= _LEAST_DELAY else None
+
+    def cost(delay: float) -> float:
+        return _squares(errors(later(responses, without, intervals, delay)))
+
+    coarse = np.linspace(-_MOST_DELAY, _MOST_DELAY, _DELAYS + 1)
+    best = int(np.argmin([cost(one) for one in coarse]))
+    if best in (0, _DELAYS):
+        return None
+    fine = np.linspace(coarse[best - 1], coarse[best + 1], 2 * _BETWEEN + 1)
+    delay = float(fine[int(np.argmin([cost(one) for one in fine]))])
+    return delay if abs(delay) >= _LEAST_DELAY else None
 
 
 def capped(

@@ -1,7 +1,8 @@
 """The one cause that would explain what a model does otherwise than the plant: a value, a switch, a delay or a limit.
 
 Causes are tried where they can be: switches and kinds by a run each, numbers by one difference each, of which those
-that promise the most are followed. Delays and limits are read from the responses."""
+that promise the most are followed. Delays and limits are read from the responses. The voltage between two samples,
+where it jumps, is nobody's error: the part of an error that it may have made is taken out of each."""
 
 from __future__ import annotations
 
@@ -25,12 +26,14 @@ from orchestrator.studies.validation.causes import (
 )
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import RecordedEvent, cut_event, noise_before, rms_error
+from orchestrator.studies.validation.hidden import HiddenPart, hidden_voltages, with_hidden
 from orchestrator.studies.validation.parameters import NEVER, Adjustable, adjustable
-from orchestrator.studies.validation.residuals import Report
+from orchestrator.studies.validation.residuals import LEAST_SCATTER, Report
 
 _MOST_RECORDED = 12.0  # length of the recordings with which causes are tried, all together [s]
 _MOST_EVENTS = 3  # those with the largest errors
 _STEP = 0.02  # difference for a sensitivity, as part of a parameter's reach
+_WORSE = 1.2  # times the squared error: a position that leaves more at a first look is none
 _FOLLOWED = 5  # numbers that are followed to their best value, those that promise the most
 _MOST_STEPS = 5  # runs in which one is followed
 _SETTLED = 1e-3  # part of the squared error: a smaller gain ends the following
@@ -48,9 +51,16 @@ def explain_errors(
     """Causes that would explain the errors, each by itself, the one that leaves the least first.
 
     Of long recordings the first seconds of the events with the largest errors are looked at."""
-    bench = _Bench(device, _looked_at(device, events), report)
-    promises = list(_promises(bench, bench.parameters("Real")))
-    found = [*_positions(bench), *_numbers(bench, promises), *_delays(bench, promises)]
+    looked_at = _looked_at(device, events)
+    bench = _Bench(device, looked_at, report)
+    rough = bench if device.rough is device else _Bench(device.rough, looked_at, report)
+    promises = list(_promises(rough, rough.parameters("Real")))
+    bench.idle = rough.idle
+    found = [
+        *_positions(bench, rough),
+        *_numbers(bench, rough, promises),
+        *_delays(rough, promises),
+    ]
     found += _limits(bench)
     better = [one for one in found if one.left < one.error]
     return sorted(better, key=lambda one: one.left)
@@ -71,11 +81,13 @@ def _looked_at(device: PlayedDevice, events: Sequence[RecordedEvent]) -> list[Re
 class _Bench:
     """A device at events, with what was found of it so far.
 
-    ``squares`` of an error: the mean over the events of the squares of the rms errors of P and Q [pu²]."""
+    ``squares`` of an error: the mean over the events of the squares of the rms errors of P and Q [pu²].
+    ``hidden``: how the voltage between samples moves the errors; that of another bench at the same events will do."""
 
     device: PlayedDevice
     events: Sequence[RecordedEvent]
     report: Report
+    hidden: HiddenPart | None = None
     base: Responses = field(init=False)
     error: Numbers = field(init=False)
     noise: float = field(init=False)
@@ -84,10 +96,27 @@ class _Bench:
     def __post_init__(self) -> None:
         played = [self.device.play(one.recording, one.start) for one in self.events]
         self.base = [one.power for one in played]
-        self.error = self.errors(self.base)
         pairs = zip(self.events, played, strict=True)
         scatters = [noise_before(event, one) for event, one in pairs]
         self.noise = float(np.mean([n[s].scatter ** 2 for n in scatters for s in "pq"]) * 2) ** 0.5
+        if self.hidden is None:
+            self.hidden = self._hidden_part()
+        self.error = self.errors(self.base)
+
+    def _hidden_part(self) -> HiddenPart:
+        """How the errors move with the voltage that no sample holds, one run for each unknown."""
+        unknown = hidden_voltages(self.events)
+        columns = []
+        for one in unknown:
+            self.report("looking between the samples")
+            event = self.events[one.event]
+            moved = with_hidden(event.recording, [one], {one.name: one.scale})
+            responses = list(self.base)
+            responses[one.event] = self.device.play(moved, event.start).power
+            columns.append((self._plain(responses) - self._plain(self.base)) / one.scale)
+        size = np.sqrt(sum(int(one.recording.good.sum()) for one in self.events))
+        scatter = max(self.noise / np.sqrt(2), LEAST_SCATTER) / size
+        return HiddenPart.of(columns, [one.scale for one in unknown], float(scatter))
 
     def parameters(self, kind: str) -> Iterator[VariableInfo]:
         for info in self.device.description.variables.values():
@@ -103,7 +132,13 @@ class _Bench:
             return None
 
     def errors(self, responses: Responses) -> Numbers:
-        """All errors of P and Q, of which the squares add up; those before the event count a start that is off."""
+        """All errors of P and Q, of which the squares add up; those before the event count a start that is off.
+
+        Without the part that the voltage between samples makes, as far as that is likely."""
+        plain = self._plain(responses)
+        return plain if self.hidden is None else self.hidden.taken_out_of(plain)
+
+    def _plain(self, responses: Responses) -> Numbers:
         parts = []
         for event, power in zip(self.events, responses, strict=True):
             recording = event.recording
@@ -128,12 +163,15 @@ class _Bench:
         )
 
 
-def _positions(bench: _Bench) -> Iterator[Explanation]:
-    """Other positions of switches and of kinds, which are whole numbers within bounds."""
+def _positions(bench: _Bench, rough: _Bench) -> Iterator[Explanation]:
+    """Other positions of switches and of kinds, whole numbers within bounds, that do not fail at a first look."""
     best: Explanation | None = None
     for info, value in _other_positions(bench):
         bench.report(f"trying {info.name} = {str(value).lower()}")
-        found = bench.responses({info.name: value})
+        looked = rough.responses({info.name: value})
+        if looked is None or _squares(rough.errors(looked)) > _WORSE * _squares(rough.error):
+            continue
+        found = looked if rough is bench else bench.responses({info.name: value})
         if found is None:
             continue
         now = bench.device.value(info.name)
@@ -160,9 +198,8 @@ def _other_positions(bench: _Bench) -> Iterator[tuple[VariableInfo, float | bool
 def _tuned(bench: _Bench, switch: Explanation) -> Iterator[Explanation]:
     """A switch in its other position, with the one number beside it that explains the most."""
     part, dot, _ = switch.name.rpartition(".")
-    other = _Bench(
-        bench.device.with_values({switch.name: switch.value}), bench.events, bench.report
-    )
+    values = {switch.name: switch.value}
+    other = _Bench(bench.device.with_values(values), bench.events, bench.report, bench.hidden)
     beside = [info for info in other.parameters("Real") if info.name.startswith(part + dot)]
     promises = list(_promises(other, beside)) if dot else []
     if promises:
@@ -185,13 +222,15 @@ class _Promise:
         return float(self.slope @ error) ** 2 / float(self.slope @ self.slope)
 
 
-def _numbers(bench: _Bench, promises: Sequence[_Promise]) -> Iterator[Explanation]:
+def _numbers(bench: _Bench, rough: _Bench, promises: Sequence[_Promise]) -> Iterator[Explanation]:
     """The numbers that promise the most, each followed by itself to where it leaves the least."""
-    ordered = sorted(promises, key=lambda one: -one.gain(bench.error))
+    ordered = sorted(promises, key=lambda one: -one.gain(rough.error))
     for one in ordered[:_FOLLOWED]:
         bench.report(f"following {one.number.name}")
-        value, left = _followed(bench, one)
+        value, left = _followed(rough, one)
         number = one.number
+        found = None if rough is bench else bench.responses({number.name: value})
+        left = left if found is None else bench.errors(found)
         yield bench.explanation(
             CauseKind.VALUE, number.name, number.start, value, left, unit=number.unit
         )
@@ -308,7 +347,8 @@ def _limiters(bench: _Bench, limit: float) -> Iterator[tuple[VariableInfo, Value
 
 def _limiter(bench: _Bench, info: VariableInfo, values: Values) -> Iterator[Explanation]:
     """A parameter that limits the current, followed to its best value, with the kind that uses it."""
-    other = _Bench(bench.device.with_values(values), bench.events, bench.report)
+    device = bench.device.with_values(values)
+    other = _Bench(device, bench.events, bench.report, bench.hidden)
     value, left = float(values[info.name]), other.error
     for promise in _promises(other, [info]):
         value, left = _followed(other, promise)
@@ -321,3 +361,7 @@ def _limiter(bench: _Bench, info: VariableInfo, values: Values) -> Iterator[Expl
     else:
         now = bench.device.value(info.name)
         yield bench.explanation(CauseKind.VALUE, info.name, now, value, left, unit=info.unit or "")
+
+
+def _squares(error: Numbers) -> float:
+    return float(error @ error)

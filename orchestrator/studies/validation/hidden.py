@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from orchestrator.core.arrays import Numbers
+from orchestrator.core.arrays import Matrix, Numbers
 from orchestrator.studies.validation.event import RecordedEvent
 from orchestrator.studies.validation.record import Recording
 
@@ -77,3 +77,30 @@ def with_hidden(
 def likelihoods(hidden: Sequence[HiddenVoltage], values: Mapping[str, float | bool]) -> Numbers:
     """Each unknown in its scale: rows that keep it near what is likely."""
     return np.array([float(values.get(one.name, 0.0)) / one.scale for one in hidden])
+
+
+@dataclass(frozen=True)
+class HiddenPart:
+    """The part of an error that the voltage between samples may have made.
+
+    ``ways``: how the error moves with each unknown, one column each, and below them how unlikely its size is;
+    ``inverse``: of these, in the sense of least squares."""
+
+    ways: Matrix
+    inverse: Matrix
+
+    @classmethod
+    def of(cls, columns: Sequence[Numbers], scales: Sequence[float], scatter: float) -> HiddenPart:
+        """From the errors' slopes; ``scales``: likely sizes; ``scatter``: of one of the errors, in their unit."""
+        if not columns:
+            return cls(np.empty((0, 0)), np.empty((0, 0)))
+        ways = np.concatenate([np.column_stack(columns), np.diag(scatter / np.array(scales))])
+        return cls(ways, np.asarray(np.linalg.pinv(ways)))
+
+    def taken_out_of(self, error: Numbers) -> Numbers:
+        """The error without that part, and below it what taking so much out of it costs in likelihood."""
+        count = self.ways.shape[1]
+        if not count:
+            return error
+        whole = np.concatenate([error, np.zeros(count)])
+        return np.asarray(whole - self.ways @ (self.inverse @ whole))

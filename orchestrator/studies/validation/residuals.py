@@ -22,7 +22,9 @@ from orchestrator.studies.validation.hidden import (
 Values = Mapping[str, float | bool]
 Report = Callable[[str], None]
 
-_LEAST_SCATTER = 2e-4  # [pu]: a recording is not trusted more than an instrument of the best class
+LEAST_SCATTER = 2e-4
+"""[pu]: a recording is not trusted more than an instrument of the best class."""
+
 _GAIN = 1e-3  # gain error of instruments of the best usual class, 0.1: no mean over samples takes it away
 _REFUSED = 1e3  # error, in scatters, of values with which the device does not run
 
@@ -120,7 +122,7 @@ def stretches_of(device: PlayedDevice, events: Sequence[RecordedEvent]) -> list[
     for event in events:
         recording = event.recording
         noise = noise_before(event, device.play(recording, event.start))
-        weights = [1 / max(noise[s].scatter, _LEAST_SCATTER) for s in ("p", "q")]
+        weights = [1 / max(noise[s].scatter, LEAST_SCATTER) for s in ("p", "q")]
         thin = max(1, int(0.5 * recording.average / recording.interval))
         rows = np.flatnonzero(recording.good)[::thin]
         found.append(ErrorRows(event, rows, (weights[0], weights[1])))

@@ -5,6 +5,7 @@ import pytest
 
 import orchestrator as gfor_in_python
 from orchestrator.studies.validation.causes import CauseKind
+from orchestrator.studies.validation.hidden import HiddenPart
 from orchestrator.studies.validation.words import explanation_sentence
 from tests.studies.validation.recordings import run, table, with_noise
 
@@ -31,6 +32,29 @@ def test_a_wrong_inertia_is_named_with_the_plants():
     assert best.value == pytest.approx(5.2, rel=0.01)
     assert best.explains
     assert not second.explains
+
+
+def test_a_wrong_droop_is_named_though_what_the_samples_do_not_hold_makes_most_of_the_error():
+    """A record of 1 kHz does not hold how the voltage jumps, and the converter rings with it."""
+    frame = with_noise(table(run("pod_p", stop=4.0, gfor__droop__R_f=0.048)))
+    best, *_ = explained(frame, values=ON)
+    assert (best.cause, best.name, best.now) == (CauseKind.VALUE, "droop.R_f", 0.05)
+    assert best.value == pytest.approx(0.048, rel=0.01)
+    assert best.share > 0.9
+
+
+def test_what_the_voltage_between_samples_makes_is_taken_out_and_costs_what_is_unlikely():
+    """Beside the formula: least squares with the unknown's size, in its likely size, as one more row."""
+    ringing = np.exp(-np.arange(200) / 20) * np.cos(np.arange(200))
+    other = np.sin(np.arange(200) / 50)
+    part = HiddenPart.of([ringing], [0.1], scatter=0.01)
+    assert np.abs(part.taken_out_of(1e-3 * ringing)).max() < 1e-5
+    left = part.taken_out_of(other)
+    size = ringing @ other / (ringing @ ringing + 0.1**2)
+    assert left @ left == pytest.approx(
+        np.sum((other - size * ringing) ** 2) + (0.1 * size) ** 2, rel=1e-9
+    )
+    assert HiddenPart.of([], [], 0.01).taken_out_of(other) is other
 
 
 def test_a_controller_that_is_off_in_the_model_is_named_with_the_plants_gain():
