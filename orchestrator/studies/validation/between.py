@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers
-from orchestrator.studies.validation.event import EventComparison
+from orchestrator.studies.validation.event import EventComparison, JumpDoubt
 from orchestrator.studies.validation.figures import SIGNALS, signals_of
 from orchestrator.studies.validation.hidden import jumps_of
 
@@ -31,10 +31,12 @@ def with_doubt_between(comparison: EventComparison) -> EventComparison:
         return comparison
     if recording.interval >= _LONG:
         moved = [replace(recording, jumps=dict.fromkeys(jumps, part)) for part in (0.0, 1.0)]
-        return _doubted(comparison, [device.play(one, event.start).power for one in moved])
+        powers = [device.play(one, event.start).power for one in moved]
+        return replace(_doubted(comparison, powers), doubt=JumpDoubt.SAMPLES)
     if device.step_size > _LONG_STEP:
         finer = replace(device, step_size=0.5 * device.step_size)
-        return _doubted(comparison, [finer.play(recording, event.start).power], 2.0)
+        powers = [finer.play(recording, event.start).power]
+        return replace(_doubted(comparison, powers, 2.0), doubt=JumpDoubt.STEP)
     return comparison
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 
 import numpy as np
 
@@ -56,6 +57,13 @@ class RecordedEvent:
     questions: tuple[Question, ...] = ()
 
 
+class JumpDoubt(StrEnum):
+    """Why the error around a jump of the voltage is known only so well."""
+
+    SAMPLES = "samples"  # when it jumped between two of them
+    STEP = "step"  # the device sees it at the begin of a step
+
+
 @dataclass(frozen=True)
 class EventComparison:
     """The response of a device at an event, beside what was measured."""
@@ -68,6 +76,14 @@ class EventComparison:
     noise: Mapping[str, SignalNoise]
     signals: Mapping[str, SignalFigures]
     questions: tuple[Question, ...] = field(default=())
+    doubt: JumpDoubt | None = None  # that is counted as noise in the errors
+
+    def beyond_doubt(self, signal: str) -> bool:
+        """Return whether a signal is off by more than scatter, samples and step may make of it, in the mean."""
+        found = [
+            of[signal] for name, of in self.errors.items() if name != "before" and signal in of
+        ]
+        return any(one.mean_abs_error > one.mean_abs_of_noise for one in found)
 
     @property
     def largest_error(self) -> tuple[str, str, ErrorFigures]:

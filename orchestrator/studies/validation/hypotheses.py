@@ -24,6 +24,7 @@ from orchestrator.studies.validation.event import (
     rms_movement,
 )
 from orchestrator.studies.validation.lost_jump import lost_jump
+from orchestrator.studies.validation.magnitude import ask_of_magnitude
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.record import PortBases, Recording, at_port
 from orchestrator.studies.validation.transformer import AT_PORT, Between, Beyond
@@ -42,6 +43,11 @@ _LEAVES_ALONE = (
     0.12  # the same of a meter that stands alone beyond a transformer: wrong reactances are like it
 )
 _MOST_FACTOR = 2000
+_BASE_MVA = 100.0  # of a usual per unit
+_BASES_AWAY = (
+    0.4,
+    2.5,
+)  # how far a ratio of movements may be from the base: the device starts elsewhere
 _NEAR_PREFIX = 0.1  # part by which a factor may miss one of ten and be it
 _CURRENTS = ("ia", "ib", "ic")
 _RATED_HZ = (50.0, 60.0)  # of grids
@@ -71,6 +77,7 @@ class Reading:
     leaves: float = _EXPLAINS  # part of the error that it may leave, to be named
     swaps: bool = False  # its two channels change their places
     turns: int = 0  # its three channels do, each by so many places
+    unit: str = ""  # that says so, in place of the factor
 
     def fits(self, recording: Recording) -> bool:
         """Return whether a recording may be meant so: it has the channels, in the unit."""
@@ -91,6 +98,8 @@ class Reading:
                 replace(channels[other], role=role).as_text()
                 for role, other in zip(self.roles, others, strict=True)
             ]
+        if self.unit:
+            return [channels[role].changed(unit=self.unit) for role in self.roles]
         return [channels[role].changed(factor=round(self.factor, 6)) for role in self.roles]
 
     def scales(self) -> tuple[float, float]:
@@ -171,7 +180,9 @@ def question_readings(comparison: EventComparison, bases: PortBases) -> list[Que
     scatter = (comparison.noise["p"].scatter, comparison.noise["q"].scatter)
     excess = [max(e * e - (_NOISY * n) ** 2, 0) ** 0.5 for e, n in zip(error, scatter, strict=True)]
     off = [one > max(_LEAST_OFF, _OFF * way) for one, way in zip(excess, moved, strict=True)]
-    named = _likeliest(comparison, bases, math.hypot(*error)) if any(off) else []
+    named = list(ask_of_magnitude(comparison))[:1] if any(off) else []
+    if any(off) and not named:
+        named = _likeliest(comparison, bases, math.hypot(*error))
     if any(off) and not named:
         named = list(_time_unit(comparison, bases, math.hypot(*error)))
     if named:
@@ -211,7 +222,7 @@ def _likeliest(comparison: EventComparison, bases: PortBases, error: float) -> l
         (left, reading)
         for reading in readings
         if reading.fits(event.recording)
-        for left in _error_left(device, near, reading, bases)
+        for left in _error_left(device.rough, near, reading, bases)
         if left <= reading.leaves * here
     ]
     if not tried:
@@ -227,12 +238,15 @@ def _likeliest(comparison: EventComparison, bases: PortBases, error: float) -> l
 
 
 def _scalings(comparison: EventComparison) -> Iterator[Reading]:
-    """Whole factors by which the device moves more than the recording, or less: of P and Q, or a prefix of one."""
+    """Factors by which the device moves more than the recording, or less: of P and Q, or a prefix of one.
+
+    First the bases of a per unit that was read as MW, then whole numbers."""
     event = comparison.event
     part = event.recording.good & (event.recording.times > event.windows.begin)
     way: Complex = (event.recording.power - event.start.power)[part]
     own: Complex = (comparison.played.power - comparison.played.rest)[part]
     both = np.concatenate([way.real, way.imag]), np.concatenate([own.real, own.imag])
+    yield from _per_unit(comparison, _ratio(*both))
     factor = _whole_factor(*both)
     if factor:
         change = _power(factor, factor)
@@ -244,6 +258,18 @@ def _scalings(comparison: EventComparison) -> Iterator[Reading]:
         yield Reading(_scale_name("Q is", q), ("q",), q, _power(1, q), "", _LEAVES)
 
 
+def _per_unit(comparison: EventComparison, ratio: float) -> Iterator[Reading]:
+    """P and Q in per unit of the rating, or of a base of 100 MVA, if the movements are not too far from it."""
+    channels, rating = comparison.event.recording.channels, comparison.device.rating
+    if not {"p", "q"} <= channels.keys() or any(channels[x].unit == "pu" for x in "pq"):
+        return
+    for base, name in ((rating, "the rating"), (_BASE_MVA, f"{_BASE_MVA:g} MVA")):
+        if _BASES_AWAY[0] < ratio / base < _BASES_AWAY[1]:
+            said, change = f"P and Q are in per unit of {name}", _power(base, base)
+            unit = "pu" if base == rating else ""
+            yield Reading(said, ("p", "q"), base, change, leaves=_LEAVES, unit=unit)
+
+
 def _scale_name(which: str, factor: float) -> str:
     said = f"1/{factor:g} of" if factor > 1 else f"{1 / factor:g} times"
     return f"{which} {said} the plant's: another prefix of the unit, or so many units"
@@ -251,8 +277,7 @@ def _scale_name(which: str, factor: float) -> str:
 
 def _whole_factor(way: Numbers, own: Numbers) -> float:
     """By what a movement is to be multiplied to be the device's: a whole number or its inverse; 0 where it is none."""
-    size = float(way @ way)
-    ratio = float(way @ own) / size if size > 0 else 0.0
+    ratio = _ratio(way, own)
     if ratio <= 0:
         return 0.0
     count = max(ratio, 1 / ratio)
@@ -261,6 +286,12 @@ def _whole_factor(way: Numbers, own: Numbers) -> float:
     if not 2 <= whole <= _MOST_FACTOR:
         return 0.0
     return float(whole) if ratio > 1 else 1 / whole
+
+
+def _ratio(way: Numbers, own: Numbers) -> float:
+    """By what a movement is to be multiplied to be the device's; 0 where nothing moves."""
+    size = float(way @ way)
+    return float(way @ own) / size if size > 0 else 0.0
 
 
 def _is_prefix(factor: float) -> bool:
@@ -379,7 +410,7 @@ def _clock(comparison: EventComparison, error: float) -> Iterator[tuple[float, Q
     delays = {
         name: one.delay
         for name, one in comparison.signals.items()
-        if name in ("p", "q") and one.delay is not None
+        if name in ("p", "q") and one.delay is not None and comparison.beyond_doubt(name)
     }
     least = max(_LEAST_CLOCK, _SAMPLES_CLOCK * interval)
     times, own = event.recording.times, comparison.played.power

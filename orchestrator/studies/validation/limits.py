@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, Literal
@@ -13,7 +13,7 @@ from pydantic import Field, ValidationError
 from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
 from orchestrator.core.toml_files import Table, fault_of, read_toml
-from orchestrator.studies.validation.event import EventComparison
+from orchestrator.studies.validation.event import EventComparison, JumpDoubt
 from orchestrator.studies.validation.figures import ErrorFigures, modes_apart
 
 Signal = Literal["p", "q", "i_p", "i_q"]
@@ -55,9 +55,20 @@ class LimitVerdict(StrEnum):
     OPEN = "open"
 
 
+class OpenCause(StrEnum):
+    """Why a figure beside its limit decides nothing."""
+
+    SCATTER = "scatter"
+    SAMPLES = "samples"
+    STEP = "step"
+    NO_FIGURE = "no figure"
+
+
 @dataclass(frozen=True)
 class Criterion:
-    """One figure beside its limit; ``noise``: what the recording's scatter alone may make of the figure."""
+    """One figure beside its limit; ``noise``: what the recording's scatter alone may make of the figure.
+
+    ``why_open``: None where it is met or not."""
 
     recording: str
     name: str
@@ -67,6 +78,7 @@ class Criterion:
     noise: float
     verdict: LimitVerdict
     device: str = ""
+    why_open: OpenCause | None = None
 
     @property
     def place(self) -> str:
@@ -83,6 +95,7 @@ class Criterion:
             "limit": self.limit,
             "of_noise": self.noise,
             "verdict": str(self.verdict),
+            "why_open": None if self.why_open is None else str(self.why_open),
         }
 
 
@@ -106,11 +119,25 @@ def read_limits(path: Path) -> LimitTables:
 
 def judge_limits(limits: LimitTables, comparison: EventComparison) -> list[Criterion]:
     """Each limit beside its figure of one event."""
-    return [
+    found = [
         *_of_windows(limits, comparison),
         *_of_delay(limits, comparison),
         *_of_ring_down(limits, comparison),
     ]
+    return [replace(one, why_open=_why_open(one, comparison)) for one in found]
+
+
+def _why_open(one: Criterion, comparison: EventComparison) -> OpenCause | None:
+    if one.verdict is not LimitVerdict.OPEN:
+        return None
+    if one.value is None:
+        return OpenCause.NO_FIGURE
+    match comparison.doubt:
+        case JumpDoubt.STEP:
+            return OpenCause.STEP
+        case JumpDoubt.SAMPLES:
+            return OpenCause.SAMPLES
+    return OpenCause.SCATTER
 
 
 def verdict_of(

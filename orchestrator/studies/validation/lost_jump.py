@@ -86,9 +86,10 @@ def lost_jump(comparison: EventComparison) -> Iterator[tuple[float, Question]]:
     error, moved = math.hypot(*rms_error(power, near)), math.hypot(*rms_movement(near))
     if error < max(_LEAST, _OFF * moved):
         return
-    found = [
-        one for smoothing in SMOOTHINGS for one in _tried(comparison.device, near, power, smoothing)
-    ]
+    device = comparison.device.rough
+    if device is not comparison.device:
+        power = device.play(near.recording, near.start).power
+    found = [one for smoothing in SMOOTHINGS for one in _tried(device, near, power, smoothing)]
     if not found:
         return
     left, length, lost = min(found, key=lambda one: one[0])

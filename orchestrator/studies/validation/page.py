@@ -23,6 +23,7 @@ from orchestrator.studies.validation.words import (
     error_sentence,
     explanation_sentence,
     fit_sentence,
+    open_sentence,
     sentence,
     untold_words,
 )
@@ -56,6 +57,8 @@ def validation_page(result: ValidationResult) -> str:
     verdict = "no verdict: no limits were given" if result.verdict is None else str(result.verdict)
     said = error_sentence(result.comparisons)
     says = [f"Limits: {verdict}.", f"{device.name}: {said}."]
+    left = open_sentence(result.criteria, result.devices)
+    says += [f"{left}."] if left else []
     places = [one for one in result.apart if one.more_than_from_record]
     says += [difference_sentence(places)] if places else []
     says += [explanation_sentence(result.explanations)] if result.explanations else []

@@ -30,6 +30,8 @@ class QuestionKind(StrEnum):
     START = "starts elsewhere"
     STUCK = "channel does not move"
     SPIKE = "spike"
+    CLIPPED = "clipped"
+    MAGNITUDE = "magnitude"
     READ_OTHERWISE = "read otherwise"
     CLOCKS = "clocks"
     METER_ELSEWHERE = "meter elsewhere"

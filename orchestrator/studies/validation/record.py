@@ -16,6 +16,7 @@ from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
 from orchestrator.studies.validation.averaging import averaged
 from orchestrator.studies.validation.channels import RecordedChannel, channels_in, in_base, unit_of
+from orchestrator.studies.validation.clipped import clipped_run
 from orchestrator.studies.validation.filled import Mask, filled_samples, runs_of
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.transformer import AT_PORT, Between, Beyond
@@ -49,6 +50,8 @@ _FASTEST_PHASOR = (
 _VOLTAGES_KV = (0.4, 0.69, 10, 20, 33, 66, 110, 132, 150, 220, 230, 275, 345, 380, 400, 500, 525)
 _NORMAL = (0.8, 1.2)  # magnitude of the voltage before the event [pu] that is not asked about
 _MOST_LOADED = 1.3  # apparent power before the event [pu of the rating] that is not asked about
+_LEAST_LOADED = 0.01  # the same that a plant feeds at least
+_KILO = 1000.0
 _FARTHEST_HZ = 1.0  # a grid's frequency is nearer to the rated one before an event
 
 _VOLTAGES = {"v", "angle", "f", "va", "vb", "vc"}
@@ -253,6 +256,15 @@ class _Reading:
                 self.ask(QuestionKind.STUCK, value=float(self.dataset[column][known][0]), **figures)
             if role == "v" and _scatters(value):
                 self._ask_of_still_angle()
+            run = clipped_run(value) if role in ("p", "q") else None
+            if run is not None:
+                low, high = run
+                figures = {"role": role, "column": column, "at": float(times[low])}
+                figures |= {
+                    "value": float(value[low]),
+                    "length": float(times[high - 1] - times[low]),
+                }
+                self.ask(QuestionKind.CLIPPED, **figures)
             before, after = value[1:-1] - value[:-2], value[1:-1] - value[2:]
             alone = np.where(before * after > 0, np.minimum(np.abs(before), np.abs(after)), 0.0)
             most = int(alone.argmax())
@@ -616,5 +628,14 @@ def questions_of_level(before: Recording, v: float, s: complex, bases: PortBases
         figures = {"v": v, "cause": cause, "remedy": level.changed(factor=round(factor, 6))}
         found.append(Question(QuestionKind.VOLTAGE_LEVEL, figures))
     if abs(s) > _MOST_LOADED:
-        found.append(Question(QuestionKind.RATING, {"s": abs(s), "rating": bases.rating}))
+        figures = {"s": abs(s), "rating": bases.rating, "remedy": []}
+        if _KILO * _LEAST_LOADED < abs(s) < _KILO * _MOST_LOADED:
+            units = {"p": "kW", "q": "kvar"}
+            channels = before.channels
+            figures["remedy"] = [
+                channels[role].changed(unit=unit)
+                for role, unit in units.items()
+                if role in channels
+            ]
+        found.append(Question(QuestionKind.RATING, figures))
     return found

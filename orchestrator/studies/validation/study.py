@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from orchestrator.core.errors import CosimError, InputError
 from orchestrator.core.late import xr
 from orchestrator.core.options import Option
+from orchestrator.core.threads import one_thread
 from orchestrator.studies.validation.beside import WindowApart, models_apart
 from orchestrator.studies.validation.between import with_doubt_between
 from orchestrator.studies.validation.causes import Explanation
-from orchestrator.studies.validation.device import PlayedDevice
+from orchestrator.studies.validation.device import PlayedDevice, StartRefusedError
 from orchestrator.studies.validation.event import (
     EventComparison,
     RecordedEvent,
@@ -99,6 +101,12 @@ class ValidationResult:
     others: Sequence[EventComparison] = field(default=())  # of the other model, in the same order
 
     @property
+    def devices(self) -> list[PlayedDevice]:
+        """The model, and the other one of the plant where there is one."""
+        both = (self.request.device, self.request.beside)
+        return [one for one in both if one is not None]
+
+    @property
     def apart(self) -> list[WindowApart]:
         """How far two models are from the recordings and from each other; empty where there is one."""
         pairs = zip(self.comparisons, self.others, strict=False)
@@ -137,6 +145,14 @@ def validate_device(
     request: ValidationRequest, report: Report = lambda text: None
 ) -> ValidationResult:
     """Drive the device by each recording, and judge it by the limits."""
+    with ExitStack() as kept:
+        for device in filter(None, (request.device, request.beside)):
+            kept.enter_context(device.shelf.keeping())
+        kept.enter_context(one_thread())  # matrices are small, and other threads would only wait
+        return _validate(request, report)
+
+
+def _validate(request: ValidationRequest, report: Report) -> ValidationResult:
     request.device.check_port()
     if request.fit:  # before the device is driven, which takes seconds
         _find_wanted(request)
@@ -209,11 +225,21 @@ def _compare(device: PlayedDevice, event: RecordedEvent, bases: PortBases) -> Ev
     try:
         return with_doubt_between(compare_with(device, event))
     except CosimError as error:
-        asked = [sentence(one) for one in event.questions if one.keeps_open]
-        asked += filter(None, [sign_that_starts(device, event, bases)])
-        if not asked:
+        likeliest = _likeliest_cause(device, event, bases)
+        if not likeliest:
             raise
-        raise InputError(f"{event.recording.label}: {'; '.join(asked)}. {error}") from error
+        said = error.said if isinstance(error, StartRefusedError) else str(error)
+        raise InputError(f"{event.recording.label}: {likeliest}. {said}") from error
+
+
+def _likeliest_cause(device: PlayedDevice, event: RecordedEvent, bases: PortBases) -> str:
+    """Say what most likely is wrong with a recording that a device does not start from; empty where nothing is known.
+
+    A voltage or a power of another unit makes other questions as well, and goes before them."""
+    asked = [one for one in event.questions if one.keeps_open]
+    units = [one for one in asked if one.figures.get("remedy")]
+    sign = sign_that_starts(device, event, bases)
+    return next(iter([*map(sentence, units), *filter(None, [sign]), *map(sentence, asked)]), "")
 
 
 def add_verdict(result: ValidationResult) -> ValidationResult:

@@ -35,6 +35,7 @@ from orchestrator.studies.validation.words import (
     error_sentence,
     explanation_sentence,
     fit_sentence,
+    open_sentence,
     sentence,
     untold_words,
     value_text,
@@ -258,6 +259,8 @@ def _answer(found: Validation) -> str:
     says = error_sentence(result.comparisons)
     if result.verdict is None:
         return escape(f"{result.request.device.name}: {says}; without --limits there is no verdict")
+    left = open_sentence(result.criteria, result.devices)
+    says += f"; {left}" if left else ""
     word = {"met": "MET", "not met": "NOT MET", "open": "OPEN"}[str(result.verdict)]
     return VerdictSentence(_GOOD[result.verdict], word, says).markup(result.request.device.name)
 

@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from orchestrator.core.options import Option
 from orchestrator.studies.validation.beside import WindowApart
 from orchestrator.studies.validation.causes import CauseKind, Explanation
+from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import EventComparison
 from orchestrator.studies.validation.fit import Fit, FittedParameter, Untold
+from orchestrator.studies.validation.limits import Criterion, LimitVerdict, OpenCause
 from orchestrator.studies.validation.questions import Question, QuestionKind
 
 Figures = Mapping[str, Any]
 
+_COUPLED_STEP = 100.0  # communication step of a coupled run [us]
 _ALIKE = (
     1.3  # times the error that the best cause leaves, up to which another one is hardly told apart
 )
@@ -29,6 +33,12 @@ def _voltage_level(x: Figures) -> str:
 
 
 def _rating(x: Figures) -> str:
+    if x["remedy"]:
+        given = " ".join(Option.CHANNEL + f" '{one}'" for one in x["remedy"])
+        return (
+            f"before the event the plant feeds {x['s']:.4g} pu of its rating of {x['rating']:g} MVA: are P and Q in kW "
+            f"and kvar? Then give {given}"
+        )
     return (
         f"before the event the plant feeds {x['s']:.3g} pu of its rating of {x['rating']:g} MVA: is the rating that of "
         "the whole plant? Give it with --set S_n=…, or the power's unit with --channel"
@@ -198,6 +208,22 @@ def _spike(x: Figures) -> str:
     )
 
 
+def _clipped(x: Figures) -> str:
+    return (
+        f"{x['column']!r} comes to {x['value']:.4g} pu at full speed at {x['at']:.4g} s and stays there to the last "
+        f"digit for {x['length']:.3g} s: does the recorder's range end there? Give a recording with a wider range, or "
+        "the part before, with " + Option.STOP
+    )
+
+
+def _magnitude(x: Figures) -> str:
+    return (
+        f"{x['column']!r} never falls below zero, where the model's comes to {x['least']:.3g} pu; without the sign the "
+        f"error falls from {x['error']:.3g} to {x['left']:.3g} pu (rms): was a magnitude recorded? Give the column "
+        "with the sign, as in " + Option.CHANNEL + f" '{x['role']}=COLUMN'"
+    )
+
+
 def _clocks(x: Figures) -> str:
     late = "after" if x["delay"] > 0 else "before"
     both = " by the same time" if x["together"] > 1 else ""
@@ -286,6 +312,8 @@ _SENTENCES: Mapping[QuestionKind, Callable[[Figures], str]] = {
     QuestionKind.READ_OTHERWISE: _read_otherwise,
     QuestionKind.STUCK: _stuck,
     QuestionKind.SPIKE: _spike,
+    QuestionKind.CLIPPED: _clipped,
+    QuestionKind.MAGNITUDE: _magnitude,
     QuestionKind.CLOCKS: _clocks,
     QuestionKind.METER_ELSEWHERE: _meter_elsewhere,
     QuestionKind.SETPOINT: _setpoint,
@@ -325,6 +353,39 @@ def error_sentence(comparisons: Sequence[EventComparison]) -> str:
         f"the largest error is {figures.max_error:.3g} pu, of {signal.upper()} {window} the event of "
         f"{one.event.recording.label}, at {figures.max_at:.4g} s"
     )
+
+
+_WHY_OPEN = {
+    OpenCause.SCATTER: "the recording's own scatter is as large as the limit",
+    OpenCause.SAMPLES: "between two samples it is not known when the voltage jumped",
+    OpenCause.STEP: "the device sees a jump of the voltage only at the begin of its step",
+    OpenCause.NO_FIGURE: "the recording shows none",
+}
+
+
+def open_sentence(criteria: Sequence[Criterion], devices: Sequence[PlayedDevice]) -> str:
+    """Say how many limits are met, which stay open, why, and what would help; empty where none is open."""
+    left = [one for one in criteria if one.verdict is LimitVerdict.OPEN]
+    if not left:
+        return ""
+    said = []
+    for cause in OpenCause:
+        names = dict.fromkeys(one.name for one in left if one.why_open is cause)
+        if not names:
+            continue
+        hint = ""
+        if cause is OpenCause.STEP:
+            hint = "; give " + Option.STEP + f" '{_finer_step(devices):g} us'"
+        said.append(f"{', '.join(names)} ({_WHY_OPEN[cause]}{hint})")
+    met = sum(one.verdict is LimitVerdict.MET for one in criteria)
+    return f"{met} of {len(criteria)} limits are met, and these stay open: {'; '.join(said)}"
+
+
+def _finer_step(devices: Sequence[PlayedDevice]) -> float:
+    """A communication step [us] in which a jump is seen in time: that of a coupled run, or half a stranger's own."""
+    if all(one.takes_any_step for one in devices):
+        return _COUPLED_STEP
+    return 0.5e6 * devices[0].step_size
 
 
 def difference_sentence(places: Sequence[WindowApart]) -> str:

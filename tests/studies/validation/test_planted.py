@@ -1,10 +1,13 @@
 """What would make a validation wrong in silence, each planted in a good recording and asked about."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 import orchestrator as gfor_in_python
+from orchestrator.studies.validation.clipped import clipped_run
 from orchestrator.studies.validation.limits import EXAMPLE
 from tests.studies.validation.recordings import run, table, waves, with_noise
 
@@ -146,6 +149,19 @@ PLANTED = {
         lambda f: f.assign(p_mw=f.p_mw + 12 * f.time),
         "no steady state before",
     ),
+    "P and Q are in per unit of the rating": (
+        lambda f: f.assign(p_mw=f.p_mw / 1500, q_mvar=f.q_mvar / 1500),
+        "read otherwise",
+    ),
+    "P and Q are in per unit of 100 MVA": (
+        lambda f: f.assign(p_mw=f.p_mw / 100, q_mvar=f.q_mvar / 100),
+        "read otherwise",
+    ),
+    "Q has no sign": (lambda f: f.assign(q_mvar=f.q_mvar.abs()), "magnitude"),
+    "P ends at the recorder's range": (
+        lambda f: f.assign(p_mw=f.p_mw.clip(upper=f.p_mw.quantile(0.97))),
+        "clipped",
+    ),
     "Q was not recorded": (lambda f: f.assign(q_mvar=0.0), "channel does not move"),
     "one sample of P is wild": (
         lambda f: f.assign(p_mw=f.p_mw.where(f.index != 3000, -9999.0)),
@@ -218,6 +234,58 @@ def test_the_remedy_that_is_printed_works_when_it_is_given(good):
     assert asked(turned, channels=[remedy]) == []
 
 
+def test_per_unit_that_was_read_as_mw_is_read_as_the_remedy_says(good):
+    small = good.assign(p_mw=good.p_mw / 1500, q_mvar=good.q_mvar / 1500)
+    (question,) = [one for one in asked(small) if one["keeps_open"]]
+    assert question["figures"]["remedy"] == ["p=p_mw in pu", "q=q_mvar in pu"]
+    assert asked(small, channels=question["figures"]["remedy"]) == []
+
+
+def test_power_in_kw_is_named_alone_though_the_device_does_not_start(good):
+    in_kw = good.assign(p_mw=1000 * good.p_mw, q_mvar=1000 * good.q_mvar)
+    with pytest.raises(gfor_in_python.CosimError) as refused:
+        asked(in_kw)
+    said = str(refused.value)
+    typed = re.findall(r"--channel '([^']*)'", said)
+    assert typed == ["p=p_mw in kW", "q=q_mvar in kvar"]
+    assert said.count("?") == 1
+    assert "S_n" not in said
+    assert asked(in_kw, channels=typed) == []
+
+
+def test_a_plant_at_its_limit_is_not_clipped():
+    limits = {"gfor__current_limit__kind": 1, "gfor__current_limit__I_max": 1.02}
+    limited = table(run("pod_p", stop=3.0, scale=1.12, **limits))
+    values = {"current_limit.kind": 1, "current_limit.I_max": 1.02}
+    for frame in (limited, with_noise(limited)):
+        assert "clipped" not in [one["kind"] for one in asked(frame, values)]
+
+
+def test_a_signal_that_stands_still_by_itself_is_not_clipped():
+    """At rest before a step, after one, and where it comes to rest slowly."""
+    times = np.arange(0, 2, 1e-3)
+    swing = np.where(times > 1, np.sin(5 * (times - 1)), 0.0)
+    for sign in (1, -1):
+        low, high = clipped_run(np.minimum(swing, 0.8) * sign)
+        assert times[low] == pytest.approx(1 + np.arcsin(0.8) / 5, abs=2e-3)
+        assert times[high - 1] == pytest.approx(1 + (np.pi - np.arcsin(0.8)) / 5, abs=2e-3)
+        assert clipped_run(sign * swing) is None
+        assert clipped_run(sign * (times > 1)) is None
+        assert clipped_run(np.round(sign * (times > 1) * (1 - np.exp(1 - times) ** 9), 4)) is None
+        assert clipped_run(sign * np.repeat(np.minimum(swing, 0.8)[::20], 20)) is None
+
+
+def test_a_q_that_passes_through_zero_has_its_sign(good):
+    """Beside a model whose Q is a little lower, and one whose sign is the other one."""
+    assert (good.q_mvar.min(), good.q_mvar.max()) == (
+        pytest.approx(-22, abs=9),
+        pytest.approx(30, abs=9),
+    )
+    assert "magnitude" not in [one["kind"] for one in asked(good, {"droop.R_V": 0.05})]
+    turned = asked(good.assign(q_mvar=-good.q_mvar))
+    assert [one["kind"] for one in turned] == ["read otherwise"]
+
+
 def test_channels_in_each_others_place_are_read_as_the_remedy_says(good):
     swapped = good.assign(p_mw=good.q_mvar, q_mvar=good.p_mw)
     (question,) = asked(swapped)
@@ -246,6 +314,7 @@ HONEST = {
     ).sort_index(),
     "samples are missing after the event": lambda f: without(f, 2.0, 2.1),
     "P is missing for a moment": lambda f: f.assign(p_mw=f.p_mw.mask(f.time.between(1.6, 1.65))),
+    "a twentieth of the samples without a mean": lambda f: f.iloc[::20],
     "a recorder of four digits": lambda f: f.round({"v_pu": 4, "angle_deg": 2, "p_mw": 1}),
 }
 

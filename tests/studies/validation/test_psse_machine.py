@@ -110,6 +110,29 @@ def test_the_parameters_of_pss_es_machine_are_found_again(case, recording):
         assert row.value == pytest.approx(truth[row.parameter], rel=0.02)
 
 
+SPOILT = {
+    "P and Q exchanged": (
+        lambda f: f.assign(p_mw=f.q_mvar, q_mvar=f.p_mw),
+        "read otherwise",
+    ),
+    "Q without its sign, which it loses before the event": (
+        lambda f: f.assign(q_mvar=f.q_mvar.abs()),
+        "magnitude",
+    ),
+    "P cut by the recorder's range": (
+        lambda f: f.assign(p_mw=f.p_mw.clip(upper=f.p_mw.quantile(0.97))),
+        "clipped",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SPOILT)
+def test_a_spoilt_recording_of_a_machine_is_asked_about(case, recording, name):
+    spoil, kind = SPOILT[name]
+    found = validated(case, spoil(recording)).as_json()["events"][0]["questions"]
+    assert [(one["kind"], one["keeps_open"]) for one in found] == [(kind, True)]
+
+
 def test_a_machine_that_refuses_to_draw_power_is_asked_about_the_sign(case, recording, tmp_path):
     """As a meter that counts into the plant: the turbine's least power is 0."""
     text = case.read_text(encoding="utf-8").replace('"constant_power"', '"tgov1"')
