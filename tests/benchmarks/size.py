@@ -37,11 +37,10 @@ from orchestrator.cases.flow.power_flow import (
 from orchestrator.cases.form.schema import NetworkTable
 from orchestrator.cases.networks.data import NetworkData, network_data
 from orchestrator.linear.models.linear_model import LinearModel
-from orchestrator.linear.models.linearization import Blocks, compose
+from orchestrator.linear.models.linearization import Blocks, compose, linearize_within
 from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.linear.spectra.critical_modes import find_critical_modes
 from orchestrator.linear.spectra.modes import eigenvalues
-from orchestrator.linear.spectra.shifted_equations import ShiftedEquations
 from orchestrator.linear.spectra.stability import WHOLE
 from orchestrator.systems.coupling.master import Master
 from tests.benchmarks.region_count import count_within
@@ -157,7 +156,11 @@ def measure(name: str, native: str, *, check: bool, count: bool) -> dict[str, fl
                 blocks = Blocks(master)
                 model = compose(blocks, master.schedule)
             with timed("linearise_floor"):
-                blocks.renew(master, one_of_each_kind(master))
+                for kind in one_of_each_kind(master):
+                    linearize_within(master, kind, master.clock.step_size)
+            network = blocks.components["grid"]
+            moved = int(np.abs(np.vstack([network.B, network.D])).any(axis=0).sum())
+            row["columns"] = moved + len(network.states)
             with timed("modes"):
                 critical = find_critical_modes(model, LOWEST_HZ, HIGHEST_HZ, BELOW)
             row["found"] = len(critical)
@@ -179,14 +182,16 @@ def measure(name: str, native: str, *, check: bool, count: bool) -> dict[str, fl
             table = NetworkTable(pandapower=name, stray_B=STRAY)
             numbers = network_bytes(network_data(table, Path(folder))) + 8 * row["states"]
             row["step_floor"] = numbers / bandwidth()
+            row["linearise_floor"] += row["columns"] * row["step_floor"]
     return row
 
 
 def one_of_each_kind(master: Master) -> list[str]:
-    """Return the first component of each model: equal devices need to be perturbed only once."""
+    """Return the first device of each model: equal devices need to be perturbed only once. The network is no device."""
     firsts: dict[str, str] = {}
     for name, component in master.components.items():
-        firsts.setdefault(component.description.model_name, name)
+        if name != "grid":
+            firsts.setdefault(component.description.model_name, name)
     return list(firsts.values())
 
 
@@ -195,11 +200,11 @@ def solve_around(model: LinearModel, shift: complex, modes: int) -> None:
 
     ``shift``: a point of the region [rad/s]."""
     sigma = complex(np.exp(shift * model.step_size)) if model.step_size else shift
-    factors = ShiftedEquations(model).at(sigma)
-    right = np.ones((len(model.names), 1), dtype=complex)
-    for adjoint in (False, True):
+    factors = model.shifted(sigma)
+    right = np.ones(len(model.names), dtype=complex)
+    for solve in (factors.solve, factors.solve_adjoint):
         for _ in range(modes):
-            factors.solve(right, adjoint=adjoint)
+            solve(right)
 
 
 def network_bytes(data: NetworkData) -> int:
@@ -232,7 +237,8 @@ def bandwidth() -> float:
 def stages(row: dict[str, float]) -> list[dict[str, float | str]]:
     """Return the stages of a network beside the least that their arithmetic needs [s of processor time].
 
-    Floors: linearisation, one device of each kind; critical modes, one factorisation and a solution for each left and
+    Floors: linearisation, one device of each kind, and a solution of the network for each of its states and of its
+    inputs that move; critical modes, one factorisation and a solution for each left and
     right eigenvector; step, the bytes of the network's factors and of the states by the memory's bandwidth."""
     return [
         {

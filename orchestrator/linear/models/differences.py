@@ -114,6 +114,32 @@ class PerturbedStep:
         """Perturbation of each input, for a size relative to max(1, |value|)."""
         return size * np.maximum(1.0, np.abs(RealBatch(self.component, self.inputs).read()))
 
+    def all_sizes(self, size: float) -> Matrix:
+        """Perturbation of each state and input, for a size relative to max(1, |value|)."""
+        return size * np.maximum(1.0, np.abs(RealBatch(self.component, self.names).read()))
+
+    def answer_to_all(self, turns: Matrix) -> tuple[Matrix, Matrix]:
+        """Central differences of states after a step and of outputs before it, with all moved by ±``turns``."""
+        component = self.component
+        moved, after, outputs = (
+            RealBatch(component, names) for names in (self.names, self.states, self.exits)
+        )
+        before = moved.read().copy()
+        answers = [np.zeros(len(batch.names)) for batch in (after, outputs)]
+        saved = component.save_state()
+        try:
+            for sign in (+1.0, -1.0):
+                moved.values[:] = before + sign * turns
+                moved.write()
+                answers[1] += sign * outputs.read() / 2
+                component.step(self.time, self.step_size)
+                answers[0] += sign * after.read() / 2
+                component.restore_state(saved)
+        finally:
+            component.restore_state(saved)
+            component.free_state(saved)
+        return answers[0], answers[1]
+
     def _states_around(self, turns: Matrix) -> tuple[Matrix, Matrix]:
         """States before and after a step whose inputs are moved; the component is put back."""
         component = self.component

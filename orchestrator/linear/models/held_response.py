@@ -5,7 +5,11 @@ order a step's answer to inputs follows from its answer to states, and from the 
 
     x⁺ = A·x + B·u  with  B = (A − I)·A_c⁻¹·B_c,  where  ẋ = A_c·x + B_c·u
 
-Steps in which all inputs are moved at once then prove it; where they do not, each input has its own steps."""
+Steps in which all inputs are moved at once then prove it; where they do not, each input has its own steps. With twice
+the size likewise: all states and inputs are moved at once, and where that gives what the single answers add up to, no
+element disagrees with itself at another size."""
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -30,22 +34,42 @@ def differences_by_rates(
     rates, n = step.component.description.rates, len(step.states)
     if len(step.inputs) < MANY_MOVED or len(rates) != n or step.moves_at_rest():
         return None
-    columns = range(len(step.names))
-    pair = []
-    for one in (size, 2 * size):
-        found = step.differences(columns, one, rates, columns[n:])
-        try:
-            over = np.linalg.solve(found.slopes[:, :n].T, (found.after[:, :n] - np.eye(n)).T).T
-        except np.linalg.LinAlgError:
-            return None
-        found.after[:, n:] = over @ found.slopes[:, n:]
-        found.after_up[:, n:] = over @ found.slopes_up[:, n:]
-        pair.append(found)
-    if not _is_right(step, pair[0].after[:, n:], size):
+    small = _by_rates(step, size, rates)
+    if small is None or not _is_right(step, small.after[:, n:], size):
         return None
-    none = np.zeros((0, len(columns)))
-    small, large = (found._replace(slopes=none, slopes_up=none) for found in pair)
-    return (pair[0] if with_slopes else small), large
+    none = np.zeros((0, len(step.names)))
+    rest = small._replace(slopes=none, slopes_up=none)
+    large: Differences | None = rest
+    if not _holds_for_twice(step, small, size):
+        large = _by_rates(step, 2 * size, rates)
+    if large is None:
+        return None
+    return (small if with_slopes else rest), large._replace(slopes=none, slopes_up=none)
+
+
+def _by_rates(step: PerturbedStep, size: float, rates: Sequence[str]) -> Differences | None:
+    n, columns = len(step.states), range(len(step.names))
+    found = step.differences(columns, size, rates, columns[n:])
+    try:
+        over = np.linalg.solve(found.slopes[:, :n].T, (found.after[:, :n] - np.eye(n)).T).T
+    except np.linalg.LinAlgError:
+        return None
+    found.after[:, n:] = over @ found.slopes[:, n:]
+    found.after_up[:, n:] = over @ found.slopes_up[:, n:]
+    return found
+
+
+def _holds_for_twice(step: PerturbedStep, found: Differences, size: float) -> bool:
+    """Return whether all variables moved at once by twice the size are answered by the sum of the single answers."""
+    random, sizes = np.random.default_rng(1), step.all_sizes(2 * size)
+    for _ in range(_DIRECTIONS):
+        turns = random.choice([-1.0, 1.0], len(sizes)) * sizes
+        answers = step.answer_to_all(turns)
+        for answer, matrix in zip(answers, (found.after, found.outputs), strict=True):
+            allowed = _HOLDS * (np.abs(matrix) @ sizes) + _ROUNDING * len(sizes)
+            if not (np.abs(answer - matrix @ turns) <= allowed).all():
+                return False
+    return True
 
 
 def _is_right(step: PerturbedStep, B: Matrix, size: float) -> bool:

@@ -81,3 +81,29 @@ def test_rates_that_do_not_belong_to_the_steps_are_not_believed():
         wrong = Other(step.component, step.inputs, step.exits, step.time, step.step_size)
         assert differences_by_rates(wrong, PERTURBATIONS[0], with_slopes=False) is None
         assert differences_by_rates(step, PERTURBATIONS[0], with_slopes=False) is not None
+
+
+def test_another_size_is_measured_where_it_is_answered_otherwise():
+    asked = []
+
+    class Bent(PerturbedStep):
+        """Outputs that answer twice the size by a hundred-thousandth more."""
+
+        def differences(self, varied, size, *rest):
+            asked.append(size)
+            return super().differences(varied, size, *rest)
+
+        def answer_to_all(self, turns):
+            after, outputs = super().answer_to_all(turns)
+            return after, outputs * (1 + 1e-5)
+
+    master, step = step_of("lag", {"T": T, "x_0": 0.3}, 0.3)
+    with master:
+        small, large = differences_by_rates(step, PERTURBATIONS[0], with_slopes=False)
+        assert large.after is small.after
+        bent = Bent(step.component, step.inputs, step.exits, step.time, step.step_size)
+        _, measured = differences_by_rates(bent, PERTURBATIONS[0], with_slopes=False)
+        assert asked == [PERTURBATIONS[0], 2 * PERTURBATIONS[0]]
+        rest = RealBatch(step.component, ("x", "u", "y")).read().tolist()
+    assert measured.after == pytest.approx(large.after, abs=1e-10)
+    assert rest == [0.3, 0.3, 0.3]
