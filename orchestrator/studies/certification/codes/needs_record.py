@@ -9,7 +9,7 @@ from typing import Any
 
 from orchestrator.core.safe_files import write_text
 from orchestrator.output.report.html.elements import document, table
-from orchestrator.output.report.tables import PlainTable, make_table
+from orchestrator.output.report.table import ShownTable
 from orchestrator.output.results.storage import save_json
 from orchestrator.studies.certification.codes.sensitivity import MarginSensitivity
 from orchestrator.studies.certification.codes.what_it_takes import (
@@ -26,7 +26,7 @@ FORMAT = "margin-sensitivities-1"  # form of the JSON
 NEEDS_HTML = "sensitivities.html"
 NEEDS_JSON = "sensitivities.json"
 
-_COLUMNS = ("Parameter", "Value", "Margin below", "Margin above", "Points per %")
+_COLUMNS = ("Parameter", "Value", "Margin below", "Margin above", "Points per %", "Remark")
 
 
 def save_needs(plan: ChangePlan, needs: Sequence[CriterionNeeds], folder: Path) -> list[Path]:
@@ -88,9 +88,10 @@ def _confirmed_json(c: ConfirmedChange) -> dict[str, Any]:
     }
 
 
-def needs_table(need: CriterionNeeds, *, whole: bool = False) -> PlainTable:
+def needs_table(need: CriterionNeeds, *, whole: bool = False) -> ShownTable:
+    """The sensitivities of a criterion; ``whole``: those of parameters without any effect as well."""
     rows = [_cells(s) for s in need.sensitivities if whole or not s.idle]
-    return make_table(_title(need), *_COLUMNS, rows=rows)
+    return ShownTable(_title(need), _COLUMNS, rows)
 
 
 def remarks_of(need: CriterionNeeds) -> list[str]:
@@ -168,14 +169,13 @@ def _points(per_percent: float | None) -> float | None:
 def _page(plan: ChangePlan, needs: Sequence[CriterionNeeds], made: datetime) -> str:
     sections = []
     for need in needs:
-        rows = [[escape(cell) for cell in _cells(s)] for s in need.sensitivities]
         texts = [
             *remarks_of(need),
             *([confirmed_text(need)] if any(n.confirmed for n in needs) else []),
         ]
         said = "".join(f"<p>{escape(text)}</p>" for text in texts)
         heading = f"{need.row}: {need.criterion.criterion}"
-        sections.append((heading, table(_title(need), [*_COLUMNS, "Remark"], rows) + said))
+        sections.append((heading, needs_table(need, whole=True).html() + said))
     left = [[escape(name), escape(why)] for name, why in plan.left_out.items()]
     sections.append(
         ("Parameters that were not changed", table("Left out", ["Parameter", "Why"], left, left=2))
