@@ -190,12 +190,12 @@ def _finding(
     time = float(times[pairs[0].row])
     others = [[names[k] for k in pair.other] for pair in pairs]
     verb, whose = ("loses", "its angle is") if len(group) == 1 else ("lose", "their angle is")
-    moved = "; ".join(
-        f"{pair.turns:.2f} turns against {few(other, _NAMED)}, and {'still slips' if pair.slips else 'holds'}"
-        + ("" if pair.lasts else " when one of both leaves the grid")
-        + (f" (apart from t = {times[pair.row]:.4g} s on)" if pair is not pairs[0] else "")
-        for pair, other in zip(pairs, others, strict=True)
-    )
+    parts = []
+    for pair, other in zip(pairs, others, strict=True):
+        text = _moved_against(pair, other)
+        later = f" (apart from t = {times[pair.row]:.4g} s on)"
+        parts.append(text if pair is pairs[0] else text + later)
+    moved = "; ".join(parts)
     message = (
         f"{few(group, _NAMED)} {verb} synchronism with {few(chain(*others), _NAMED)}: from "
         f"t = {time:.4g} s {whose} more than 180 degrees from theirs; at the end it has moved by {moved}"
@@ -203,12 +203,10 @@ def _finding(
     figures = {
         "turns": max(pair.turns for pair in pairs),
         "slips_at_the_end": float(any(pair.slips for pair in pairs)),
-        **(
-            {f"turns_against_{o[0]}": pair.turns for pair, o in zip(pairs, others, strict=True)}
-            if pairs[1:]
-            else {}
-        ),
     }
+    if len(pairs) > 1:
+        against = zip(pairs, others, strict=True)
+        figures |= {f"turns_against_{other[0]}": pair.turns for pair, other in against}
     return Finding(
         "loss_of_synchronism",
         time,
@@ -218,6 +216,13 @@ def _finding(
         until=None,
         figures=figures,
     )
+
+
+def _moved_against(pair: _Pair, others: Sequence[str]) -> str:
+    """Tell by how much a group has moved against others at the end, and if it still slips."""
+    state = "still slips" if pair.slips else "holds"
+    end = "" if pair.lasts else " when one of both leaves the grid"
+    return f"{pair.turns:.2f} turns against {few(others, _NAMED)}, and {state}{end}"
 
 
 def slips_at_the_end(relative: Numbers) -> bool:

@@ -55,22 +55,25 @@ def loop_margins(half: LinearModel, full: LinearModel) -> LoopMargins:
     values = np.array([around.eigenvalues(w) for w in grid])
     distance = np.abs(1 + values).min(axis=1)
     crossings = list(_crossings(around, grid, values))
-    turned = min(
-        ((abs(math.remainder(np.angle(-value), 2 * math.pi)), w) for w, value in crossings),
-        default=None,
-    )
-    delayed = min(
-        (((np.angle(value) + math.pi) % (2 * math.pi) / w, w) for w, value in crossings),
-        default=None,
-    )
-    hertz = 2 * math.pi
-    return LoopMargins(
-        phase_deg=math.degrees(turned[0]) if turned else None,
-        phase_hz=turned[1] / hertz if turned else None,
-        delay=float(delayed[0]) if delayed else None,
-        delay_hz=delayed[1] / hertz if delayed else None,
+    peak = LoopMargins(
+        phase_deg=None,
+        phase_hz=None,
+        delay=None,
+        delay_hz=None,
         peak=float(1 / distance.min()),
-        peak_hz=float(grid[distance.argmin()] / hertz),
+        peak_hz=float(grid[distance.argmin()] / (2 * math.pi)),
+    )
+    if not crossings:
+        return peak
+    angles = [(abs(math.remainder(np.angle(-value), 2 * math.pi)), w) for w, value in crossings]
+    delays = [((np.angle(value) + math.pi) % (2 * math.pi) / w, w) for w, value in crossings]
+    (angle, at_angle), (delay, at_delay) = min(angles), min(delays)
+    return replace(
+        peak,
+        phase_deg=math.degrees(angle),
+        phase_hz=at_angle / (2 * math.pi),
+        delay=float(delay),
+        delay_hz=at_delay / (2 * math.pi),
     )
 
 

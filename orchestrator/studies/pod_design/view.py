@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import astuple
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -137,13 +138,15 @@ def parameter_file_path(given: str | Path, argument: str = "path") -> Path:
 def design_json(d: PodDesign) -> dict[str, Any]:
     S, setting = d.sensitivities, d.final.setting
     before, after = d.stability_before, d.stability
+    compensation: dict[str, float | None] = dict.fromkeys(("T_S1", "T_S2", "N_S"))
+    if not d.target.has_gain_alone:
+        T_S1, T_S2 = setting.filters.T_S1, setting.filters.T_S2
+        compensation = {"T_S1": T_S1, "T_S2": T_S2, "N_S": d.target.stages}
     return {
         "controller": d.request.controller,
         "target_mode": _complex(d.initial),
         "sensitivity": _polar(S.value),
-        "T_S1": None if d.target.has_gain_alone else setting.filters.T_S1,
-        "T_S2": None if d.target.has_gain_alone else setting.filters.T_S2,
-        "N_S": None if d.target.has_gain_alone else d.target.stages,
+        **compensation,
         "K": setting.gain,
         "K_unbounded": d.unbounded_gain,
         "predicted_mode": _complex(d.predicted),
@@ -232,7 +235,21 @@ def _other_json(mode: Mode | None) -> dict[str, Any] | None:
     }
 
 
+_LOOP_MARGINS = (
+    "phase_margin_deg",
+    "phase_margin_hz",
+    "delay_margin_s",
+    "delay_margin_hz",
+    "sensitivity_peak",
+    "sensitivity_peak_hz",
+)
+"""Keys of the fields of `LoopMargins`, in their order."""
+
+
 def _margins_json(m: Margins) -> dict[str, Any]:
+    loop: dict[str, float | None] = dict.fromkeys(_LOOP_MARGINS)
+    if m.loop is not None:
+        loop = dict(zip(_LOOP_MARGINS, astuple(m.loop), strict=True))
     return {
         "damping_limit": m.limit,
         "gain_up": m.up,
@@ -240,12 +257,7 @@ def _margins_json(m: Margins) -> dict[str, Any]:
         "lost_above": _complex(m.lost_up) if m.lost_up is not None else None,
         "lost_below": _complex(m.lost_down) if m.lost_down is not None else None,
         "largest_factor_tried": m.reach,
-        "phase_margin_deg": m.loop.phase_deg if m.loop else None,
-        "phase_margin_hz": m.loop.phase_hz if m.loop else None,
-        "delay_margin_s": m.loop.delay if m.loop else None,
-        "delay_margin_hz": m.loop.delay_hz if m.loop else None,
-        "sensitivity_peak": m.loop.peak if m.loop else None,
-        "sensitivity_peak_hz": m.loop.peak_hz if m.loop else None,
+        **loop,
         "damping_ratio_with": m.variations,
     }
 

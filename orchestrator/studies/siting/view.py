@@ -268,7 +268,6 @@ def _unit_in_keys(result: SiteResult) -> str:
 
 def as_json(result: SiteResult) -> dict[str, Any]:
     here, stable = result.intact.name, [at.found.stability.stable for at in result.situations]
-    own = _unit_in_keys(result)
     return {
         **result.prepared.about,
         "device": result.request.device,
@@ -291,29 +290,35 @@ def as_json(result: SiteResult) -> dict[str, Any]:
         "warnings": list(result.intact.found.warnings),
         "code": code_hash(),
         "modes": _modes(result.intact.modes),
-        "buses": [
-            {
-                "bus": bus,
-                "rank": k + 1,
-                "shift": {m: _shift(by[bus], own) for m, by in result.shifts[DEVICE][here].items()},
-                "p": {m: _shift(by[bus], _MW) for m, by in result.shifts[ACTIVE][here].items()},
-                "q": {m: _shift(by[bus], _MVAR) for m, by in result.shifts[REACTIVE][here].items()},
-                "least": dict(zip(("damping_points", "situation"), result.least(bus), strict=True)),
-            }
-            for k, bus in enumerate(result.ranking)
-        ],
-        "outages": [
-            {
-                "outage": at.name,
-                "modes": _modes(at.modes),
-                "best": _best(result, at.name, at.modes[0].label),
-            }
-            for at in result.worst_first
-            if at.name != here
-        ],
+        "buses": [_bus_json(result, bus, k + 1) for k, bus in enumerate(result.ranking)],
+        "outages": [_outage_json(result, at) for at in result.worst_first if at.name != here],
         "not_judged": dict(result.not_judged),
         "confirmed": [confirmation_json(one) for one in result.confirmations],
     }
+
+
+def _bus_json(result: SiteResult, bus: str, rank: int) -> dict[str, Any]:
+    """Return the shifts of each mode by support at a bus."""
+
+    def shifts(of: str, unit: str) -> dict[str, Any]:
+        by_mode = result.shifts[of][result.intact.name]
+        return {mode: _shift(by_bus[bus], unit) for mode, by_bus in by_mode.items()}
+
+    points, situation = result.least(bus)
+    return {
+        "bus": bus,
+        "rank": rank,
+        "shift": shifts(DEVICE, _unit_in_keys(result)),
+        "p": shifts(ACTIVE, _MW),
+        "q": shifts(REACTIVE, _MVAR),
+        "least": {"damping_points": points, "situation": situation},
+    }
+
+
+def _outage_json(result: SiteResult, at: Situation) -> dict[str, Any]:
+    """Return the modes after an outage, and the best buses for the least damped one."""
+    best = _best(result, at.name, at.modes[0].label)
+    return {"outage": at.name, "modes": _modes(at.modes), "best": best}
 
 
 def _modes(modes: tuple[SeenMode, ...]) -> list[dict[str, Any]]:
