@@ -10,7 +10,7 @@ from orchestrator.cases.new.new_case import write_case
 from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.core.errors import CaseError, InputError
 from orchestrator.face.cli import main
-from tests.cases.networks.psse import LINES, LOADS, REACTANCES, TRANSFORMERS, raw
+from tests.cases.networks.psse import LINES, LOADS, REACTANCES, TRANSFORMERS, raw, records
 
 DYR = "\n".join(f"{n} 'GENCLS' 1 {h} 0.0 /" for n, h in ((1, 9.55), (2, 3.33), (3, 2.35)))
 BASES = {1: 247.5, 2: 192.0, 3: 128.0}
@@ -92,8 +92,8 @@ def seq(machines=None, lines=LINES, of_transformers=None, mutual=(), revision=33
     if revision > 34:
         text += ["RPTFORMAT, AMPOUT=0", "0 / END OF SYSTEM-WIDE DATA, BEGIN GENERATOR DATA"]
     following = [name for name, _ in parts[1:]] + [""]
-    for (name, records), after in zip(parts, following, strict=True):
-        text += [*records, f"0 / END OF {name} DATA" + (f", BEGIN {after} DATA" if after else "")]
+    for (name, rows), after in zip(parts, following, strict=True):
+        text += [*rows, f"0 / END OF {name} DATA" + (f", BEGIN {after} DATA" if after else "")]
     return "\n".join([*text, "Q", ""])
 
 
@@ -299,3 +299,49 @@ def test_a_run_tells_the_kind_the_impedances_and_their_source(tmp_path, capsys):
     main(["report", str(tmp_path / "out"), "--out", str(page)])
     assert "1-phase at line_4_5, 30 %" in page.read_text()
     assert "Traceback" not in err
+
+
+def test_three_windings_have_their_delta_as_a_way_to_earth(tmp_path):
+    """YNynd: both stars in series through the star point, which the delta's leg leads to earth."""
+    of_windings = 0.03, 0.035, 0.08
+    rows, rates = records(33), "0,0,0"
+    rows["BUS"].append("10,'BUS 10    ',13.8,1,1,1,1,1.0,0.0,1.1,0.9,1.1,0.9")
+    rows["LOAD"].append("10,'1 ',1,1,1,5,1,0,0,0,0,1,1,0")
+    first = next(k for k, x in enumerate(rows["TRANSFORMER"]) if x.startswith("7,2"))
+    winding = f"1.0,0,0,{rates},0,0,1.1,0.9,1.1,0.9,33,0,0,0,0"
+    rows["TRANSFORMER"][first : first + 4] = [
+        "7,2,10,'1 ',1,1,1,0,0,2,'T 2',1,1,1",
+        "0,0.0625,100,0,0.1,100,0,0.12,100,1.0,0.0",
+        *[winding] * 3,
+    ]
+    coded = transformers(True)
+    parts = ",".join(f"0,0,0,{x}" for x in of_windings)
+    coded[1] = f"7,2,10,'1 ',1,1,12,{parts},0,0"
+    files = {"raw": raw(33, rows), "dyr": DYR, "seq": seq(of_transformers=coded)}
+    for suffix, text in files.items():
+        (tmp_path / f"grid.{suffix}").write_text(text)
+    case = CASE.format(seq='seq = "grid.seq"', fault='bus = "bus_7"\nkind = "1-phase"')
+    (tmp_path / "case.toml").write_text(case)
+    (found,) = load_case(tmp_path / "case.toml").prepare()[0].faults
+
+    Y = np.zeros((11, 11), dtype=complex)  # the last is the star point
+
+    def series(i, j, z):
+        incidence = np.zeros(11)
+        incidence[i - 1], incidence[j - 1] = 1, -1
+        Y[:] += np.outer(incidence, incidence) / z
+
+    for line in LINES:
+        z, b = zero_of(line)
+        series(*line[:2], z)
+        for end in line[:2]:
+            Y[end - 1, end - 1] += 0.5j * b
+    for bus, z in ((4, 0.9j * 0.0576), (9, 0.9j * 0.0586 + 3 * complex(*PATH_AT_9))):
+        Y[bus - 1, bus - 1] += 1 / z
+    for n in X2:
+        Y[n - 1, n - 1] += BASES[n] / 100 / 0.05j
+    for bus, x in zip((7, 2), of_windings[:2], strict=True):
+        series(bus, 11, 1j * x)
+    Y[10, 10] += 1 / (1j * of_windings[2])
+    Y[9, 9] += 1  # behind the delta nothing counts
+    assert found.zero == pytest.approx(np.linalg.inv(Y)[6, 6], rel=1e-9)
