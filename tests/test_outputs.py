@@ -82,6 +82,15 @@ def test_binary_files_differ_by_their_content_and_not_by_the_time_of_their_writi
     ]
 
 
+def test_paths_of_two_trees_and_the_hash_of_their_code_are_no_difference(tmp_path):
+    texts = [f"/trees/{name}/case.toml: code {12 * name}: x = 1" for name in "ab"]
+    folders = _folders(tmp_path, {"a.txt": texts[0]}, {"a.txt": texts[1]})
+    assert len(compare(*folders, [])) == 1
+    for folder, name in zip(folders, "ab", strict=True):
+        (folder / outputs.TREE).write_text(f"/trees/{name}", encoding="utf-8")
+    assert compare(*folders, []) == []
+
+
 def test_a_command_that_is_refused_by_mistake_is_named(tmp_path, monkeypatch):
     """Two folders in which a command was refused are alike, and show nothing."""
     monkeypatch.setattr(outputs, "COMMANDS", {"wrong": "no-such-command"})

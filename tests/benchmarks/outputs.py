@@ -157,8 +157,11 @@ _MASKS = (
     (re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d+)?)?(Z|\+00:00)?"), "DATE"),
     (re.compile(r"\b[0-9a-f]{40,64}\b(\.\.\.)?"), "HASH"),
     (re.compile(r"\b[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}\b"), "ID"),
+    (re.compile(r"\bcode [0-9a-f]{12}\b"), "code HASH"),
+    (re.compile(r"│ +[\d,]+ │ +[\d.]+ │ +\d+ │ +\d+% │[^│]*│"), "│ SPEED │"),
 )
-"""Pieces of text that differ from run to run: times, hashes of files with a time in them, identifiers."""
+"""Pieces of text that differ from run to run: times, hashes of files with a time in them and of the
+code, identifiers, and how fast a run was."""
 
 _IN_LINES = {".html", ".txt", ".toml"}
 """Kinds of files whose lines are aligned before they are compared."""
@@ -169,6 +172,9 @@ _XML = {".xml", ".ssd", ".ssv", ".ssm"}
 _ONLY_PRESENT = {".png", ".pdf", ".lock"}
 """Kinds of files of which only the presence is compared."""
 
+
+TREE = "tree.txt"
+"""File in a folder of outputs with the path of the tree whose code ran."""
 
 Leaf = tuple[str, str]
 """A place in a file and what stands there."""
@@ -195,6 +201,7 @@ def write(folder: Path, only: Sequence[str], tree: Path = ROOT) -> list[str]:
     environment = os.environ | {"PYTHONPATH": str(tree)}
     _check_tree(tree, environment)
     _write_inputs(folder)
+    (folder / TREE).write_text(str(tree), encoding="utf-8")
     wrong = []
     for name, words in COMMANDS.items():
         if only and not any(fnmatchcase(name, pattern) for pattern in only):
@@ -307,7 +314,11 @@ def _of_lines(first: Sequence[Leaf], second: Sequence[Leaf]) -> Iterator[tuple[s
 
 
 def _files(top: Path) -> Iterator[Path]:
-    return (path for path in top.rglob("*") if path.is_file() and path.name != "manifest.json")
+    return (
+        path
+        for path in top.rglob("*")
+        if path.is_file() and path.name not in ("manifest.json", TREE)
+    )
 
 
 def _leaves(path: Path, top: Path) -> Iterator[Leaf]:
@@ -325,7 +336,10 @@ def _leaves(path: Path, top: Path) -> Iterator[Leaf]:
     if path.suffix in of_bytes:
         yield from of_bytes[path.suffix](path)
         return
-    text = _masked(path.read_text(encoding="utf-8", errors="replace").replace(str(top), "FOLDER"))
+    text = path.read_text(encoding="utf-8", errors="replace").replace(str(top), "FOLDER")
+    if (top / TREE).exists():
+        text = text.replace((top / TREE).read_text(encoding="utf-8"), "TREE")
+    text = _masked(text)
     readers: dict[str, Callable[[str], Iterator[Leaf]]] = {
         ".json": _of_json,
         ".csv": _of_csv,
