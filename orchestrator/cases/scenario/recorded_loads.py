@@ -24,7 +24,7 @@ def take_laws(draft: Draft, records: Sequence[DynamicRecord]) -> frozenset[tuple
             else load
             for load in data.loads
         ),
-        recorded_loads=frozenset(recorded.laws),
+        recorded_loads=data.recorded_loads | frozenset(recorded.laws),
     )
     draft.found.questions += recorded.remarks
     return recorded.places

@@ -382,7 +382,7 @@ def _account(
     left = {name.upper() for name in table.dyr_leave_out}
     wanted = [record for record in records if record.name not in left]
     taken = take_laws(draft, wanted) | take_frequency(draft, wanted)
-    taken |= {(motor.record.file, motor.record.line) for motor in motors}
+    taken |= motors.places
     uses = [
         replace(use, use=UseOfRecord.USED, why="", of_no_machine=False)
         if (use.file, use.line) in taken
@@ -394,7 +394,7 @@ def _account(
     said = network.load_model if network else None
     among_phasors = table.generator.endswith(_PHASOR)
     draft.found.questions += unused_models(records, uses, said, among_phasors=among_phasors)
-    return motors
+    return motors.loads
 
 
 def _alphas(draft: Draft, table: UnitsTable, rows: Sequence[UnitRow]) -> dict[str, float]:

@@ -15,7 +15,10 @@ MOST_BYTES = 100_000_000  # of a file
 _TOKEN = re.compile(r"""(?P<quoted>'[^']*'|"[^"]*")|(?P<plain>[^\s,'"/]+)|(?P<slash>/)|,""")
 _MODEL = re.compile(r"[A-Za-z]\w{2,}")  # of a DC line, whose name stands where others have a bus
 EVENT = "TOGGLE"  # an event of ANDES, which writes some into its files of dynamics data
-_OWN_MODEL = "USRMDL"  # a user's model, whose name is the first value
+_OWN_MODELS = (
+    "USRMDL",
+    "USRLOD",
+)  # a user's model of a machine or a load: its name is the first value
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,7 @@ def _record(file: str, line: int, tokens: Sequence[str], names: int) -> DynamicR
             f"{' '.join(tokens[:4])!r} is no record; one is bus 'MODEL' id values … /",
         )
     name, machine, values = tokens[1].upper(), tokens[2].strip(), tuple(tokens[3:])
-    if name == _OWN_MODEL and values:
+    if name in _OWN_MODELS and values:
         name, values = values[0].upper(), values[1:]
     return DynamicRecord(file, line, int(tokens[0]), name, machine, values)
 

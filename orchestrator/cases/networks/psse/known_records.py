@@ -13,6 +13,8 @@ from fmus.regfm_b1.dyr_fields import REGFM_B1_RECORDS
 from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS, DyrRecord
 from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
+from orchestrator.cases.networks.psse.composite_loads import COMPOSITE_NAMES
+from orchestrator.cases.networks.psse.composite_loads import MODEL as MODEL_OF_MOTORS
 from orchestrator.cases.networks.psse.frequency_records import FREQUENCY_RECORDS
 from orchestrator.cases.networks.psse.load_records import LOAD_RECORDS
 from orchestrator.cases.networks.psse.motor_loads import MOTOR_NAMES
@@ -24,6 +26,8 @@ _LOADS = "GridPACK's reader and model"
 _DISTRIBUTED = "WECC's specification of DER_A; fields as PowerSystems.jl lists PSS/E's"
 _INDUCTION = "PowerWorld's guide to PSS/E's machine models"
 _FREQUENCY = "PowerWorld's guide to PSS/E's load models"
+_COMPOSITE = "WECC's composite load model; fields as InterPSS reads them"
+_LEFT_OUT = "motors A to C by their share, the rest a load; feeder, trips, stalling left out"
 _MOTORS = "PowerWorld's guide to PSS/E's load models, and STEPS' reader"
 _GENERIC = (
     "WECC's generic converters: fields as ANDES and GridPACK read them, diagrams of WECC's guide"
@@ -73,6 +77,10 @@ def known_records() -> list[KnownRecord]:
     found += [
         KnownRecord(name, "load", "load_model", _FREQUENCY, "r, s not used; no constant impedances")
         for name in FREQUENCY_RECORDS
+    ]
+    found += [
+        KnownRecord(name, "load", MODEL_OF_MOTORS, _COMPOSITE, _LEFT_OUT)
+        for name in COMPOSITE_NAMES
     ]
     found += [
         KnownRecord(name, "load", record.part, _MOTORS, "; ".join(_limits(record)))

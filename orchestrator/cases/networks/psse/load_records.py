@@ -110,14 +110,14 @@ def _law_of(record: DynamicRecord) -> RecordedLaw | None:
     if min(map(abs, sums)) < _LEAST_SHARE:
         return None
     active, reactive = (
-        _mixture(shares[k : k + 3], powers[k : k + 3], total)
+        mixture(shares[k : k + 3], powers[k : k + 3], total)
         for k, total in zip((0, 3), sums, strict=True)
     )
     return RecordedLaw((record.file, record.line), active, reactive, k_pf, k_qf)
 
 
-def _mixture(shares: Sequence[float], powers: Sequence[float], total: float) -> Zip:
-    """The mixture with the power, slope and curvature of Σ shares·vⁿ at v = 1, over its sum."""
+def mixture(shares: Sequence[float], powers: Sequence[float], total: float) -> Zip:
+    """Return the mixture with the power, slope and curvature of Σ shares·vⁿ at v = 1, over its sum."""
     z = i = p = 0.0
     for share, n in zip(shares, powers, strict=True):
         z += share / total * n * (n - 1) / 2
@@ -127,10 +127,15 @@ def _mixture(shares: Sequence[float], powers: Sequence[float], total: float) -> 
 
 
 def _mean(loads: Sequence[FileLoad], laws: Sequence[RecordedLaw]) -> RecordedLaw:
+    return mean_of_laws(laws, [complex(load.p_mw, load.q_mvar) for load in loads])
+
+
+def mean_of_laws(laws: Sequence[RecordedLaw], powers: Sequence[complex]) -> RecordedLaw:
+    """Return the mean of laws by the powers [MW, Mvar] that follow them."""
     if len(set(laws)) == 1:
         return laws[0]
-    of_p = list(_weights([load.p_mw for load in loads]))
-    of_q = list(_weights([load.q_mvar for load in loads]))
+    of_p = list(_weights([power.real for power in powers]))
+    of_q = list(_weights([power.imag for power in powers]))
     active, reactive = [law.active for law in laws], [law.reactive for law in laws]
     k_pf, k_qf = [law.k_pf for law in laws], [law.k_qf for law in laws]
     return replace(

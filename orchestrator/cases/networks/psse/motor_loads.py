@@ -35,7 +35,8 @@ _SATURATION = ("SE1", "SE2")
 class MotorLoad:
     """A motor in the place of a load: its component's name, its bus, its model, and its parameters.
 
-    ``load``: the file's load; ``record``: the record that stands for it."""
+    ``load``: the file's load; ``record``: the record that stands for it; ``drawn``: the motor's part of it [MW,
+    Mvar]."""
 
     name: str
     bus: str
@@ -43,6 +44,7 @@ class MotorLoad:
     parameters: Mapping[str, float]
     load: FileLoad
     record: DynamicRecord
+    drawn: complex
 
 
 def motor_loads(
@@ -66,7 +68,8 @@ def motor_loads(
         known = MOTOR_NAMES[record.name]
         name = f"motor{load.bus}{own}"
         parameters = _parameters(record, known, load)
-        found.append(MotorLoad(name, buses[load.load], known.part, parameters, load, record))
+        at = buses[load.load]
+        found.append(MotorLoad(name, at, known.part, parameters, load, record, drawn=load.drawn))
     return found
 
 
@@ -74,7 +77,7 @@ def loads_without(loads: Sequence[Load], motors: Sequence[MotorLoad]) -> Iterato
     """Yield the case's loads less what the motors draw; none of which nothing is left."""
     taken: dict[str, complex] = {}
     for motor in motors:
-        taken[motor.load.load] = taken.get(motor.load.load, 0j) + motor.load.drawn
+        taken[motor.load.load] = taken.get(motor.load.load, 0j) + motor.drawn
     for load in loads:
         drawn = taken.get(load.name)
         if drawn is None:
@@ -91,7 +94,7 @@ def motor_remarks(motors: Sequence[MotorLoad], load_mw: float) -> Iterator[Probl
     ``load_mw``: active power of all loads, of the motors too."""
     for name in dict.fromkeys(motor.record.name for motor in motors):
         own = [motor for motor in motors if motor.record.name == name]
-        p_mw = sum(motor.load.drawn.real for motor in own)
+        p_mw = sum(motor.drawn.real for motor in own)
         buses = few([bus_of(str(motor.load.bus)) for motor in own], _SHOWN)
         saturated = any(_saturates(motor.record) for motor in own)
         text = (

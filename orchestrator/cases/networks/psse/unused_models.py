@@ -4,6 +4,7 @@ import tomllib
 from collections.abc import Iterator, Sequence
 
 from orchestrator.cases.form.schema import LoadModelTable
+from orchestrator.cases.networks.psse.composite_loads import COMPOSITE_NAMES
 from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
 from orchestrator.cases.networks.psse.missing_models import (
     DEVICE,
@@ -29,9 +30,7 @@ _VALUES = 14
 _LAWS = {0.0: "p", 1.0: "i", 2.0: "z"}
 _SUM = 1e-3  # by which shares may miss 1
 _MOST_BUSES = 8
-_PHASORS = (
-    '; it is an induction motor, a phasor model: write models = "phasor" at the top of the case'
-)
+_PHASORS = '; induction motors stand for it, which are phasor models: write models = "phasor" at the top of the case'
 _NO_LOAD = "; the file has no load in service that it names and that draws active power"
 
 
@@ -63,7 +62,7 @@ def unused_models(
         )
         if kind in _MATTER and not is_said:
             remedy = f"; to take it for all loads, write {law} in [network]" if law else ""
-            if name in MOTOR_NAMES:
+            if name in MOTOR_NAMES or name in COMPOSITE_NAMES:
                 remedy = _NO_LOAD if among_phasors else _PHASORS
             places = few(
                 dict.fromkeys(record.line_of_dc or str(record.bus) for record in own), _MOST_BUSES

@@ -1,0 +1,164 @@
+"""Composite loads of CMLDBLU2 (WECC's CMPLDW), approximated: motors A to C, and the rest as a load with a law.
+
+Each of the motors A to C with three phases is an induction machine with the record's reactances and time constants, and
+draws its share of the load's P and Q; a susceptance is beside it. Motor D, which is an air conditioner's, and the
+electronic load draw constant powers; the static load follows its exponents and its frequency. Left out: the
+transformer and the feeder before the load, tripping and stalling, and what distributed generation the record has.
+
+Source: WECC, "Composite Load Model for Dynamic Simulations" (2012); the order of the fields as parsers of PSS/E's files
+have it (InterPSS; a public script that writes such records)."""
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from fmus.grid.element_data import Load, Zip
+from fmus.induction_machine.dyr_fields import SUBSYSTEMS
+from orchestrator.cases.networks.conversion import bus_of
+from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
+from orchestrator.cases.networks.psse.load_records import (
+    RecordedLaw,
+    mean_of_laws,
+    mixture,
+    records_for,
+)
+from orchestrator.cases.networks.psse.motor_loads import MotorLoad
+from orchestrator.cases.networks.psse.raw_network import FileLoad
+from orchestrator.core.errors import InputError, Problem, QuestionTopic, counted, few
+
+COMPOSITE_NAMES = tuple(f"CMLD{subsystem}U2" for subsystem in SUBSYSTEMS)
+"""The records, the narrower first."""
+MODEL = "induction_generator_phasor"  # the machine by its reactances
+_NUMBERS = 133  # of a record, behind the numbers that describe a user's model
+_SHARES = slice(18, 23)  # of motors A to D and of the electronic load
+_STATIC = slice(27, 37)  # exponent and share, twice, and factor of the frequency: of P, then of Q
+_MOTORS = {"a": 37, "b": 57, "c": 77}  # place of each motor's numbers
+_OF_MOTOR = ("RA", "X", "Xp", "Xpp", "Tp", "Tpp", "H", "E")  # behind its type and its loading
+_THREE_PHASES = 3.0
+LEAKAGE = 0.8
+"""Leakage by subtransient reactance: the record has none, and the model's equations leave it out."""
+_SHOWN = 8
+_NO_LETTER = re.compile(r"\W")
+
+
+@dataclass(frozen=True)
+class CompositeLoads:
+    """Motors of composite loads, and the laws of what is left, by the name of the case's load."""
+
+    motors: tuple[MotorLoad, ...]
+    laws: Mapping[str, RecordedLaw]
+    records: tuple[DynamicRecord, ...]
+
+
+def composite_loads(
+    records: Sequence[DynamicRecord], file_loads: Sequence[FileLoad], loads: Sequence[Load]
+) -> CompositeLoads:
+    """Return the motors and the laws of the loads that draw power and that a record names."""
+    elements = {load.name: load for load in loads}
+    at_bus = Counter(load.bus for load in file_loads)
+    motors: list[MotorLoad] = []
+    rests: dict[str, list[tuple[FileLoad, float, RecordedLaw]]] = {}
+    used = []
+    for load in file_loads:
+        record = next(records_for(load, records, COMPOSITE_NAMES), None)
+        if record is None or load.load not in elements or not load.drawn.real > 0:
+            continue
+        numbers = _numbers(record)
+        own = list(_motors(load, record, numbers, elements[load.load].bus, at_bus[load.bus] > 1))
+        motors += own
+        used.append(record)
+        left = 1 - sum(motor.drawn.real for motor in own) / load.drawn.real
+        rests.setdefault(load.load, []).append((load, left, _law(record, numbers, left)))
+    laws = {name: _law_of_all(elements[name], own) for name, own in rests.items()}
+    return CompositeLoads(tuple(motors), laws, tuple(dict.fromkeys(used)))
+
+
+def composite_remarks(found: CompositeLoads) -> Iterator[Problem]:
+    """Tell what stands for composite loads."""
+    for name in dict.fromkeys(record.name for record in found.records):
+        own = [motor for motor in found.motors if motor.record.name == name]
+        place = next(record.place for record in found.records if record.name == name)
+        p_mw = sum(motor.drawn.real for motor in own)
+        buses = few(dict.fromkeys(bus_of(str(motor.load.bus)) for motor in own), _SHOWN)
+        text = (
+            f"{name}, a composite load, is approximated: {counted(len(own), 'induction motor')} A to C for {p_mw:.4g} "
+            f"MW ({buses}), motor D and the electronic load as constant powers, the static load by its exponents. The "
+            "transformer and the feeder before it, tripping and stalling are left out; to see what that is worth, "
+            f"leave it out: dyr_leave_out = ['{name}'] in [units]"
+        )
+        yield Problem(place, text, topic=QuestionTopic(f"{name} approximated"))
+
+
+def _numbers(record: DynamicRecord) -> list[float]:
+    try:
+        numbers = [float(text) for text in record.values[-_NUMBERS:]]
+    except ValueError:
+        numbers = []
+    if len(numbers) != _NUMBERS:
+        raise InputError(
+            f"{record.place}: {record.name} has {len(record.values)} values behind its name; it ends with {_NUMBERS} "
+            "numbers"
+        )
+    shares = numbers[_SHARES]
+    if min(shares) < 0 or sum(shares) > 1 + 1e-6:
+        told = ", ".join(f"{share:g}" for share in shares)
+        raise InputError(
+            f"{record.place}: {record.name} has the shares {told} of motors A to D and the electronic load; each is "
+            "0 or more, and their sum 1 at most"
+        )
+    return numbers
+
+
+def _motors(
+    load: FileLoad, record: DynamicRecord, numbers: Sequence[float], bus: str, is_named: bool
+) -> Iterator[MotorLoad]:
+    own = f"_{_NO_LETTER.sub('_', load.name)}" if is_named else ""
+    for (letter, at), share in zip(_MOTORS.items(), numbers[_SHARES], strict=False):
+        kind, loading, *of_motor = numbers[at : at + 2 + len(_OF_MOTOR)]
+        if not share or kind != _THREE_PHASES:
+            continue
+        if not loading > 0:
+            raise InputError(
+                f"{record.place}: {record.name} has the loading LFm = {loading:g} of motor {letter.upper()}; it must "
+                "exceed 0"
+            )
+        drawn = share * load.drawn
+        rating = drawn.real / loading
+        parameters = dict(zip(_OF_MOTOR, of_motor, strict=True))
+        parameters |= {"Xl": LEAKAGE * (parameters["Xpp"] or parameters["Xp"]), "S_n": rating}
+        parameters |= {"P_0": -drawn.real / rating, "Q_0": -drawn.imag / rating}
+        name = f"motor{load.bus}{own}_{letter}"
+        yield MotorLoad(name, bus, MODEL, parameters, load, record, drawn=drawn)
+
+
+def _law(record: DynamicRecord, numbers: Sequence[float], left: float) -> RecordedLaw:
+    """The law of what no motor draws: constant powers, and the static load, which has the rest of the shares."""
+    static = max(0.0, 1 - sum(numbers[_SHARES]))
+    share = static / left if left > 0 else 0.0
+    of_p, of_q = numbers[_STATIC][:5], numbers[_STATIC][5:]
+    laws = [_static(numbers) for numbers in (of_p, of_q)]
+    active, reactive = (
+        Zip(share * law.z, share * law.i, share * law.p + 1 - share) for law in laws
+    )
+    return RecordedLaw(
+        (record.file, record.line), active, reactive, share * of_p[4], share * of_q[4]
+    )
+
+
+def _static(numbers: Sequence[float]) -> Zip:
+    """The law of a static load; what both shares leave is a constant power."""
+    first, of_first, second, of_second, _ = numbers
+    return mixture((of_first, of_second, 1 - of_first - of_second), (first, second, 0.0), 1.0)
+
+
+def _law_of_all(element: Load, own: Sequence[tuple[FileLoad, float, RecordedLaw]]) -> RecordedLaw:
+    """The law of one element of the case; loads beside at its bus keep theirs."""
+    parts = [(left * load.drawn, law) for load, left, law in own]
+    others = complex(element.p_mw, element.q_mvar) - sum(load.drawn for load, _, _ in own)
+    if abs(others) > 1e-6:
+        place = own[0][2].place
+        law = RecordedLaw(place, element.active, element.reactive, element.k_pf, element.k_qf)
+        parts.append((others, law))
+    powers, laws = zip(*parts, strict=True)
+    return mean_of_laws(laws, powers)
