@@ -48,7 +48,9 @@ def test_what_the_voltage_between_samples_makes_is_taken_out_and_costs_what_is_u
     ringing = np.exp(-np.arange(200) / 20) * np.cos(np.arange(200))
     other = np.sin(np.arange(200) / 50)
     part = HiddenPart.of([ringing], [0.1], scatter=0.01)
-    assert np.abs(part.taken_out_of(1e-3 * ringing)).max() < 1e-5
+    *rest, cost = part.taken_out_of(1e-3 * ringing)
+    assert np.abs(rest).max() < 1e-5
+    assert abs(cost) == pytest.approx(1e-3 / 0.1 * 0.01, rel=0.01)
     left = part.taken_out_of(other)
     size = ringing @ other / (ringing @ ringing + 0.1**2)
     assert left @ left == pytest.approx(
