@@ -33,6 +33,13 @@ _FORMATS = (
     (b"\xcf\xfa\xed\xfe", "darwin64", "a library for macOS"),
 )
 
+_WINDOWS_MACHINES = {
+    b"\x4c\x01": "of 32 bits",
+    b"\xc4\x01": "of 32 bits for ARM",
+    b"\x64\xaa": "for ARM64",
+}
+"""Machines that nothing here runs, by the field Machine of a DLL's COFF header (Microsoft's "PE Format")."""
+
 
 class DllError(ValueError):
     """A DLL cannot be made into an FMU."""
@@ -102,7 +109,7 @@ def read_dll(
         if named == files:
             break
         files = named  # known from what it declares; now it is run with them
-    if asked.in_its_start and (unseen := hidden(interface, given, files)):
+    if asked.in_its_start and (unseen := unseen_files(interface, given, files)):
         raise DllError(f"{path.name}: the process that runs it {asked.end}; {unseen}")
     return VendorDll(
         path, interface, Trial.from_json(answer["trial"]), platform, files, tuple(looked.values())
@@ -119,10 +126,10 @@ def platform_of(path: Path, also: Sequence[str] = ()) -> str:
     here = {"linux": "linux64", "win32": "win64", "darwin": "darwin64"}.get(sys.platform)
     for mark, platform, words in _FORMATS:
         if head.startswith(mark):
-            if platform == "win64" and _is_32_bit(path):
+            if platform == "win64" and (other := _other_windows_machine(path)):
                 raise DllError(
-                    f"{path.name}: it is a Windows DLL of 32 bits, and those of 64 bits can be run; ask its author for "
-                    "such a build"
+                    f"{path.name}: it is a Windows DLL {other}, and those for 64-bit x86 can be run; "
+                    "ask its author for such a build"
                 )
             if platform != here and platform not in also:
                 raise DllError(
@@ -136,12 +143,14 @@ def platform_of(path: Path, also: Sequence[str] = ()) -> str:
     )
 
 
-def _is_32_bit(path: Path) -> bool:
-    """Return whether a Windows DLL is not for 64-bit x86, by the machine in its head."""
+def _other_windows_machine(path: Path) -> str:
+    """Say for which machine a Windows DLL is, by its head; empty for 64-bit x86, and where the head does not tell."""
     with path.open("rb") as file:
         head = file.read(4096)
     at = int.from_bytes(head[60:64], "little")
-    return head[at : at + 4] == b"PE\0\0" and head[at + 4 : at + 6] == b"\x4c\x01"
+    if head[at : at + 4] != b"PE\0\0":
+        return ""
+    return _WINDOWS_MACHINES.get(head[at + 4 : at + 6], "")
 
 
 def dll_fmu(
@@ -263,7 +272,9 @@ def places(
     return found
 
 
-def hidden(interface: DllInterface, texts: Mapping[str, str], files: Mapping[str, Path]) -> str:
+def unseen_files(
+    interface: DllInterface, texts: Mapping[str, str], files: Mapping[str, Path]
+) -> str:
     """Which text parameters name files that the DLL does not see, and the remedy; empty where there are none."""
     named = {
         n: v

@@ -211,10 +211,16 @@ def test_without_wine_a_windows_dll_is_refused_with_the_remedy(tmp_path, monkeyp
         info(library)
 
 
-def test_a_windows_dll_of_32_bits_is_refused_by_name(under_wine, tmp_path):
+@pytest.mark.parametrize(
+    ("machine", "words"),
+    [
+        (b"\x4c\x01", "a Windows DLL of 32 bits"),
+        (b"\xc4\x01", "a Windows DLL of 32 bits for ARM"),
+        (b"\x64\xaa", "a Windows DLL for ARM64"),
+    ],
+)
+def test_a_windows_dll_for_another_machine_is_refused_by_name(tmp_path, machine, words):
     library = tmp_path / "vendor.dll"
-    library.write_bytes(
-        b"MZ" + bytes(58) + (64).to_bytes(4, "little") + b"PE\0\0\x4c\x01" + bytes(64)
-    )
-    with pytest.raises(InputError, match="a Windows DLL of 32 bits"):
-        info(library)
+    library.write_bytes(b"MZ" + bytes(58) + (64).to_bytes(4, "little") + b"PE\0\0" + machine)
+    with pytest.raises(DllError, match=f"it is {words}, and those for 64-bit x86 can be run"):
+        read_dll(library, also=("win64",))
