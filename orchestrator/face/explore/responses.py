@@ -2,7 +2,7 @@
 
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fnmatch import fnmatchcase
 from math import isclose
 from pathlib import Path
@@ -26,6 +26,9 @@ _POINTS = 1000  # of a streamed curve
 _PAUSE = 0.25  # between two parts of a streamed curve [s]
 _MOST = 24  # signals that one question may ask for
 _FEW = 6  # of a recording that has none of those that are asked for
+
+_COMPARED = {"events": "events: was", "step_size_s": "step [s]: was"}
+"""What a recording keeps of its scenario beside values, by its attribute; and the words of a difference."""
 
 Say = Callable[[dict[str, Any]], None]
 
@@ -96,18 +99,30 @@ class Streamed:
         self._said = time.monotonic()
 
 
+def undrawn(wanted: Sequence[str], drawn: Iterable[str]) -> list[str]:
+    """Return the names and patterns that no curve is of: others may be drawn in their place, which the page tells."""
+    names = list(drawn)
+    return [
+        one for one in wanted if one not in names and not any(fnmatchcase(n, one) for n in names)
+    ]
+
+
 def linear(scenario: Scenario, wanted: Sequence[str]) -> dict[str, Any]:
-    return {"curves": curves(scenario.response(), chosen(scenario, wanted))}
+    drawn = curves(scenario.response(), chosen(scenario, wanted))
+    return {"curves": drawn, "undrawn": undrawn(wanted, drawn)}
 
 
 def simulated(scenario: Scenario, wanted: Sequence[str], say: Say) -> dict[str, Any]:
-    """Run the co-simulation and keep it as ``gfor run`` does: ``folder``, ``curves``, ``findings``, ``ended_early``."""
+    """Run the co-simulation and keep it as ``gfor run`` does: ``folder``, ``curves``, ``findings``, ``ended_early``;
+    ``undrawn``: what `undrawn` returns."""
     names = chosen(scenario, wanted)
     run: Run = scenario.run(observers=[Streamed(scenario, names, say)])
     folder = run.save(Path("results") / "explore" / f"{scenario.prepared.case.name}_{new_run_id()}")
+    drawn = curves(run.dataset, names)
     return {
         "folder": str(folder),
-        "curves": curves(run.dataset, names),
+        "curves": drawn,
+        "undrawn": undrawn(wanted, drawn),
         "answer": run.summary()["answer"],
         "findings": [finding.message for finding in run.findings],
         "ended_early": None if run.failure is None else str(run.failure),
@@ -143,12 +158,14 @@ def recorded(place: str, scenario: Scenario, wanted: Sequence[str]) -> dict[str,
         ]
         now = {"events": "; ".join(map(str, prepared.events)), "step_size_s": prepared.step_size}
         differs += [
-            f"{key}: {told.get(key) or 'none'}"
-            for key, value in now.items()
-            if told.get(key) != value
+            f"{words} {told.get(key) or 'none'}, is {now[key] or 'none'}"
+            for key, words in _COMPARED.items()
+            if told.get(key) != now[key]
         ]
+    drawn = drawn or curves(dataset, names[:_FEW])
     return {
-        "curves": drawn or curves(dataset, names[:_FEW]),
+        "curves": drawn,
+        "undrawn": undrawn(wanted, drawn),
         "names": names,
         "differs": differs,
         "of": place,

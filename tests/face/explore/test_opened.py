@@ -47,7 +47,9 @@ def test_a_run_opens_with_its_case_values_and_signals(run, place):
         float(kept.max()),
         float(kept["time"][-1]),
     )
-    assert answer["differs"] == []
+    assert answer["differs"] == answer["undrawn"] == []
+    misspelt = recorded(found, ["gfor.p", "gfor.pp", "gfor.x*"])
+    assert (list(misspelt["curves"]), misspelt["undrawn"]) == (["gfor.p"], ["gfor.pp", "gfor.x*"])
     assert recorded(found, ["gfor.p"], {"gfor.P_0": 0.4})["differs"] == ["gfor.P_0 was 0.5, is 0.4"]
     other = Desk("infinite_bus", False, found[2]["recorded"])
     question = {
@@ -58,7 +60,9 @@ def test_a_run_opens_with_its_case_values_and_signals(run, place):
         "step": 5e-5,
     }
     differs = other.answer(question | {"events": []}, print)["differs"]
-    assert [text.split(":")[0] for text in differs] == ["events", "step_size_s"]
+    assert [text.split(":")[0] for text in differs] == ["events", "step [s]"]
+    assert differs[0].endswith(", is none")
+    assert differs[1].endswith(", is 5e-05")
     with pytest.raises(InputError, match="nothing was recorded of scenario 'load_step'"):
         recorded(found, [], scenario="load_step")
 

@@ -38,10 +38,12 @@ function setEvents(events) {
   paintEvents(); paintPlots(); paintElement();
   compute();
 }
+// What was asked for and has no curve: a name that is misspelt, or a signal that is not recorded.
+const withoutCurve = found => found.undrawn?.length ? `no curve of ${found.undrawn.join(", ")}: not recorded under this name` : "";
 async function linearResponse() {
   const found = await ask("linear response", { ask: "response", ...theCase(), signals: wantedSignals() }, $("run-said"));
   if (!found) { $("run-said").classList.add("bad"); return; }
-  $("run-said").textContent = "";
+  $("run-said").textContent = withoutCurve(found);
   takeCurves("linear", Object.entries(found.curves));
 }
 function takeCurves(kind, curves) {
@@ -54,7 +56,7 @@ async function recordedSignals() {
   const pairs = wantedPairs(), found = await ask("recording", { ask: "recorded", ...theCase(), signals: pairs.map(([s, other]) => other ?? s) }, $("run-said"));
   $("run-said").classList.toggle("bad", !found);
   if (!found) return;
-  $("run-said").textContent = `recorded: ${found.of}${found.differs.length ? `; not as the case is now: ${found.differs.slice(0, 4).join("; ")}${found.differs.length > 4 ? ` and ${found.differs.length - 4} more` : ""}` : ""}`;
+  $("run-said").textContent = `recorded: ${found.of}${found.differs.length ? `; not as the case is now: ${found.differs.slice(0, 4).join("; ")}${found.differs.length > 4 ? ` and ${found.differs.length - 4} more` : ""}` : ""}${found.undrawn?.length ? `; ${withoutCurve(found)}` : ""}`;
   $("signal-names").append(...found.names.slice(0, 400).map(name => make("option", { value: name })));
   const own = Object.fromEntries(pairs.filter(([, other]) => other).map(([s, other]) => [other, s]));
   takeCurves("recorded", Object.entries(found.curves).map(([name, curve]) => [own[name] ?? name, curve]));
@@ -69,7 +71,7 @@ async function coSimulation() {
   const { verdict, remark } = found.answer;
   const ring = found.ring_down ? `; it rings with ${fixed(found.ring_down.frequency_hz, 4)} Hz, ${fixed(found.ring_down.damping_percent, 2)} %` : "";
   const first = make("b", { class: { true: "good", false: "bad" }[found.answer.stable] }, `${verdict}${remark ? `: ${remark}` : ""}`);
-  $("run-said").replaceChildren(first, `${ring}${found.ended_early ? `; ended early: ${found.ended_early}` : ""}. Kept in ${found.folder}.${found.findings.map(text => `\nfound: ${text}`).join("")}`);
+  $("run-said").replaceChildren(first, `${ring}${found.ended_early ? `; ended early: ${found.ended_early}` : ""}. Kept in ${found.folder}.${found.undrawn?.length ? `\n${withoutCurve(found)}` : ""}${found.findings.map(text => `\nfound: ${text}`).join("")}`);
   paintPlots();
 }
 // A part of a run that goes on.
