@@ -21,11 +21,11 @@ from orchestrator.linear.signals.ambient import ambient_modes
 from orchestrator.linear.signals.identification import sampling
 from orchestrator.linear.signals.mode_doubts import straight_line
 from orchestrator.output.results.recorded import warn_of_early_end
+from orchestrator.output.results.trajectory import open_trajectory
 from orchestrator.studies.oscillations.verdict import forced_frequencies
 from orchestrator.studies.signals.ambient import AmbientModes, AmbientWindow
 from orchestrator.studies.signals.angle_units import doubtful_angles
 from orchestrator.studies.signals.comparison import (
-    open_trajectory,
     recorded,
     require_numbers,
     strongest_modes,

@@ -20,7 +20,7 @@ from orchestrator.face.explore.saved import save_page
 from orchestrator.face.explore.server import Explorer
 from orchestrator.face.explore.worker import Desk
 from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ
-from orchestrator.studies.signals.comparison import open_trajectory
+from orchestrator.output.results.trajectory import open_trajectory
 from orchestrator.studies.sweep.axes import parse_vary
 
 

@@ -19,7 +19,7 @@ from orchestrator.face.api.scenario import Scenario
 from orchestrator.output.report.html.charts import thinned
 from orchestrator.output.results.signals import combined, signal
 from orchestrator.output.results.staging import new_run_id
-from orchestrator.studies.signals.comparison import open_trajectory
+from orchestrator.output.results.trajectory import open_trajectory
 from orchestrator.systems.coupling.observers import ObservedRun
 
 _POINTS = 1000  # of a streamed curve

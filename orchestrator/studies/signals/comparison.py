@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from orchestrator.cases.form.names import close_names
 from orchestrator.core.errors import AnalysisError, InputError, few
-from orchestrator.core.safe_files import PARTIAL
 from orchestrator.linear.signals.identification import (
     TOLERANCE,
     IdentifiedMode,
@@ -27,12 +24,7 @@ from orchestrator.linear.signals.mode_doubts import (
     with_doubts,
     worth_showing,
 )
-from orchestrator.output.results.manifest import MANIFEST, ResultsWarning, checked
-from orchestrator.output.results.readers import reader_of
-from orchestrator.output.results.recorded import open_recording, open_whole
-from orchestrator.output.results.recording import FOLDER, TRAJECTORY, parts_of
 from orchestrator.output.results.signals import signal
-from orchestrator.output.results.staging import unfinished
 from orchestrator.studies.signals.measured import common_times, is_measured, measured_modes
 
 if TYPE_CHECKING:
@@ -55,56 +47,6 @@ class Comparison:
     at: float  # time of the largest difference [s]
     # strongest oscillation in each run from ``start`` on; None where none is found
     modes: tuple[IdentifiedMode | None, IdentifiedMode | None]
-
-
-def open_trajectory(path: Path) -> xr.Dataset:
-    """A recorded run: ``trajectory.nc``, or the scenario's folder that holds it; also one that is not finished.
-
-    A file whose ending has a reader is a measured recording: COMTRADE, CSV, Excel, and what plug-ins read."""
-    read = None if path.is_dir() else reader_of(path)
-    if read is not None:
-        return read(path)
-    if parts_of(path / FOLDER):
-        dataset = open_recording(path / FOLDER)
-        if not dataset.sizes["time"]:
-            raise InputError(f"{path}: nothing was recorded yet")
-        reached = float(dataset["time"][-1])
-        text = f"{path}: this recording is not finished; it reaches t = {reached:.6g} s"
-        warnings.warn(text, ResultsWarning, stacklevel=2)
-        return dataset
-    file = path / TRAJECTORY if path.is_dir() else path
-    if not path.exists() and path.suffix and not path.name.endswith(TRAJECTORY):
-        raise InputError(
-            f"{path}: there is no such file; give a recording's file, or the folder of a scenario's results"
-        )
-    if not file.is_file():
-        raise InputError(f"{path}: there is no trajectory.nc; {_hint(path)}")
-    if path.is_dir() or (path.parent / MANIFEST).is_file():
-        checked(file.parent, [file.name])
-    try:
-        dataset = open_whole(file)
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"{file}: it cannot be read as NetCDF, or is damaged; give the folder of a scenario's results, its "
-            "trajectory.nc, a measured recording in COMTRADE (.cfg, .cff), in CSV (.csv) or Excel (.xlsx)"
-        ) from error
-    if not dataset.sizes.get("time"):
-        raise InputError(f"{file}: nothing was recorded in it; run the scenario again")
-    return dataset
-
-
-def _hint(path: Path) -> str:
-    inside = sorted(p.parent.name for p in path.glob("*/trajectory.nc")) if path.is_dir() else []
-    if inside:
-        return f"choose a scenario in it: {', '.join(inside)}"
-    begun = [
-        folder.name
-        for folder in unfinished(path.parent)
-        if folder.name.startswith(f"{path.name}{PARTIAL}")
-    ]
-    if begun:
-        return f"its run did not end, or still goes on; what it recorded is in {', '.join(begun)} beside it"
-    return "`gfor run` writes one a scenario"
 
 
 def require_numbers(curve: xr.DataArray, expression: str, label: str) -> None:
@@ -233,7 +175,9 @@ def most_different(
 
 
 def _strongest(curve: xr.DataArray, start: float) -> IdentifiedMode | None:
-    """Above a quarter of the sampling frequency there is perhaps no oscillation of the system."""
+    """Return the strongest oscillation from ``start`` [s] on.
+
+    Above a quarter of the sampling frequency there is perhaps no oscillation of the system."""
     times = curve["time"].values
     highest = 0.25 / sampling(times).interval if len(times) > 1 else 0.0
     try:

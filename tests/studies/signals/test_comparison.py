@@ -6,7 +6,7 @@ import xarray as xr
 
 from orchestrator.core.errors import AnalysisError, InputError
 from orchestrator.face.api.identification import identify
-from orchestrator.studies.signals.comparison import compare, most_different, open_trajectory
+from orchestrator.studies.signals.comparison import compare, most_different
 from orchestrator.studies.signals.measured import common_times
 
 LABELS = ("one", "two")
@@ -112,18 +112,6 @@ def test_signals_are_ranked_by_their_difference_beside_their_own_motion():
     two = run_of(t, g__large=101 * t, g__small=2e-3 * t, g__same=t)
     assert most_different(one, two) == ["g.small", "g.large", "g.same"]
     assert most_different(one, two, 1) == ["g.small"]
-
-
-def test_a_folder_of_scenarios_and_a_damaged_file_are_told_apart(tmp_path):
-    t = np.linspace(0, 1, 11)
-    (tmp_path / "base").mkdir()
-    run_of(t, g__x=t).to_netcdf(tmp_path / "base" / "trajectory.nc", engine="scipy")
-    assert open_trajectory(tmp_path / "base")["g.x"].values.tolist() == t.tolist()
-    with pytest.raises(InputError, match="choose a scenario in it: base"):
-        open_trajectory(tmp_path)
-    (tmp_path / "base" / "trajectory.nc").write_bytes(b"no file of results")
-    with pytest.raises(InputError, match="cannot be read as NetCDF"):
-        open_trajectory(tmp_path / "base")
 
 
 def test_a_signal_that_is_no_number_is_one_error():
