@@ -105,6 +105,7 @@ def esst3a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         V_R = _amplifier(m, p, compensated, V_R0)
         x = m.state("inner", V_M0, "pu", "first-order lag with limits", base="E_fd")
         V_M = clamp(x, inner.V_MMIN, inner.V_MMAX)
+        # v_t depends on E_fd, and E_fd on v_t, weakly: two rounds from I_fd, the value of E_fd at rest
         first = V_M * source.available(seen.terminal(seen.I_fd))
         E_fd = V_M * source.available(seen.terminal(first))
         rest = V_R - fmin(inner.K_G * E_fd, inner.V_GMAX)

@@ -135,6 +135,7 @@ def expic1(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         def into(v_t: Phasor) -> Expr:
             return clamp(V_R * source.available(v_t), p.E_FDMIN, p.E_FDMAX)
 
+        # v_t depends on E_fd, and E_fd on v_t if T_E = 0, weakly: two rounds from I_fd, the value of E_fd at rest
         driven = into(seen.terminal(into(seen.terminal(seen.I_fd))))
         T_E = if_else(rotates, p.T_E, BYPASS_TIME)
         back = if_else(rotates, p.K_E * E + curve.part(E), E)

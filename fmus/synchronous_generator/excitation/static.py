@@ -166,6 +166,7 @@ def st4b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
             free = (inner.K_PM * V_A + x) / (1 + V_B * inner.K_PM * inner.K_G)
             return V_B * clamp(free, inner.low, inner.high)
 
+        # v_t depends on E_fd, and E_fd on v_t, weakly: two rounds from I_fd, the value of E_fd at rest
         E_fd = field_voltage(seen.terminal(field_voltage(seen.terminal(seen.I_fd))))
         rest = V_A - inner.K_G * E_fd
         free = inner.K_PM * rest + x

@@ -90,7 +90,9 @@ class Deferral:
             self._before = None
 
     def too_late(self) -> bool:
-        """Return whether the signal that is taken now repeats one that was delivered meanwhile."""
+        """Return whether the signal that is taken now repeats, by `_ask_again`, one that was delivered meanwhile.
+
+        It must not end anything a second time."""
         repeats, self._repeats = self._repeats, False
         return repeats and not self.waits
 
@@ -188,7 +190,7 @@ class _Calls:
         def hook(raised: Any) -> None:
             frame = sys._getframe().f_back
             if raised.exc_type is not None and issubclass(raised.exc_type, self._kind):
-                if not self._wait(frame) and frame is not None:
+                if not self._defer(frame) and frame is not None:
                     self._deferral.until(frame)
             else:
                 otherwise(raised)
@@ -198,7 +200,7 @@ class _Calls:
     def leave(self, frame: FrameType | None) -> None:
         """End the process from its main thread, but not in the middle of a call; for a handler, with its frame."""
         self._kind = SystemExit
-        self._ask(frame)
+        self._defer_or_raise(frame)
 
     def take(self, number: int, frame: FrameType | None) -> None:
         """The handler of signals that end a command."""
@@ -210,17 +212,19 @@ class _Calls:
                 signal.signal(signal.SIGTERM, signal.SIG_DFL)
                 os.kill(os.getpid(), signal.SIGTERM)
             self.terminated = True
-        self._ask(frame)
+        self._defer_or_raise(frame)
 
-    def _ask(self, frame: FrameType | None) -> None:
-        if self._asked.value or self._deferral.waits:  # who asks twice does not want to wait
+    def _defer_or_raise(self, frame: FrameType | None) -> None:
+        if (
+            self._asked.value or self._deferral.waits
+        ):  # who sends a second signal does not want to wait
             self._asked.value = 0
             self._deferral.drop()
             raise self._kind
-        if not self._wait(frame):
+        if not self._defer(frame):
             raise self._kind
 
-    def _wait(self, frame: FrameType | None) -> bool:
+    def _defer(self, frame: FrameType | None) -> bool:
         """Have it raised at the end of the call, or at the next line of ours; False where neither is to come."""
         if self._depth:
             self._asked.value = 1

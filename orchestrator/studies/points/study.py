@@ -25,7 +25,7 @@ Plan = TypeVar("Plan")
 Result = TypeVar("Result")
 Shown = TypeVar("Shown")
 
-_WORKER = "orchestrator.studies.points.worker"
+_WORKER_IMPORTS = "orchestrator.studies.points.worker_imports"
 
 
 def choose_executor(
@@ -51,7 +51,7 @@ def choose_executor(
     ):
         raise InputError(f"workers = {workers!r}; it must be a whole number of at least 1")
     workers = workers or number_of_cores()
-    return Processes(workers, (_WORKER, *imports)) if workers > 1 else Serial()
+    return Processes(workers, (_WORKER_IMPORTS, *imports)) if workers > 1 else Serial()
 
 
 def _nothing(shown: Any) -> Iterable[str]:

@@ -71,7 +71,7 @@ def draw_trajectories(axis: Any, samples: Samples) -> bool:
     right = max(0.35, 1.2 * max(p["real"] for p in points))
     highest = 1.08 * max(p["frequency"] for p in points)
     for k, trajectory, curve in drawn:
-        strong = trajectory.carries is not None
+        strong = trajectory.case_name is not None
         for piece in _rows(curve):
             at = [s["real"] for _, s in piece], [s["frequency"] for _, s in piece]
             axis.plot(
@@ -101,7 +101,7 @@ def draw_trajectories(axis: Any, samples: Samples) -> bool:
         unstable = len(sweep.unstable(samples.axes))
         words = f": UNSTABLE at {unstable} of its points" if unstable else ""
         axis.plot([], [], color=colour(k), label=sweep.prepared.title + words)
-    numbered = {t.name: number for _, t, _ in drawn if t.carries and (number := _number(t))}
+    numbered = {t.name: number for _, t, _ in drawn if t.case_name and (number := _number(t))}
     for name, number in numbered.items():
         axis.plot([], [], linestyle="", marker=f"${number}$", color="black", label=name)
     axis.set_xlim(left, right)
@@ -127,7 +127,7 @@ def _named(samples: Samples) -> list[tuple[int, ScenarioSweep, Trajectory, Curve
         (k, sweep, trajectory, samples.of(sweep, trajectory))
         for k, sweep in enumerate(samples.result.scenarios)
         for trajectory in sweep.trajectories
-        if trajectory.carries is not None
+        if trajectory.case_name is not None
     ]
 
 
@@ -198,13 +198,13 @@ def _dash(trajectory: Trajectory) -> str:
 
 def _number(trajectory: Trajectory) -> str:
     """Which of the modes that bear the same name it is; empty if it is the only one."""
-    return trajectory.name.removeprefix(trajectory.carries or "").strip()
+    return trajectory.name.removeprefix(trajectory.case_name or "").strip()
 
 
 def _finish(figure: Figure, axes: Any, samples: Samples, curves: Any) -> None:
     for k, sweep, trajectory, _ in curves:
         label = sweep.prepared.title
-        label += f": {trajectory.name}" if trajectory.name != trajectory.carries else ""
+        label += f": {trajectory.name}" if trajectory.name != trajectory.case_name else ""
         axes[0].plot([], [], color=colour(k), linestyle=_dash(trajectory), label=label)
     handles, labels = axes[0].get_legend_handles_labels()
     axes[0].set_title("Named modes (thick: where the case's name falls on the mode)", loc="left")

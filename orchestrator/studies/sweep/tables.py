@@ -26,11 +26,11 @@ def trajectories(samples: Samples) -> Table:
     table = make_table(
         title, "Mode", "f [Hz]", "Damping [%]", "Least [%]", "Most [%]", "Points", "Alike"
     )
-    anything = any(t.carries for s in samples.result.scenarios for t in s.trajectories)
+    anything = any(t.case_name for s in samples.result.scenarios for t in s.trajectories)
     for sweep in samples.result.scenarios:
         for trajectory in sweep.trajectories:
             curve = samples.of(sweep, trajectory)
-            if not curve or (anything and trajectory.carries is None):
+            if not curve or (anything and trajectory.case_name is None):
                 continue
             (_, first), (_, last) = curve[0], curve[-1]
             where, least = min(curve, key=lambda entry: float(entry[1]["damping"]))

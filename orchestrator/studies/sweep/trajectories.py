@@ -39,7 +39,7 @@ class Trajectory:
     # the case's name for the mode, with a number if several trajectories carry this name in turn; otherwise "mode" and
     # a number
     name: str = ""
-    carries: str | None = None  # the case's name
+    case_name: str | None = None  # of the mode; None if the case names no such mode
     points: dict[GridPlace, TrajectoryPoint] = field(default_factory=dict)
 
 
@@ -107,6 +107,10 @@ def _history(
     index: int,
     frequency_range: tuple[float, float],
 ) -> tuple[float, Beginning]:
+    """Return how alike a mode is to the same mode at the point before, and how its trajectory came to it.
+
+    Between two points of the grid there may be refining ones. The walk goes back through them, to the next point of the
+    grid or to where the trajectory begins, and the least similarity on the way counts."""
     number, refined, alike = followed.trajectory[place][index], False, 1.0
     while True:
         origin = followed.origin[place][index]
@@ -133,8 +137,8 @@ def _with_names(
     ):
         for name, i in points[place].named.items():
             owner = next(t for t in trajectories if place in t.points and t.points[place].mode == i)
-            if owner.carries is None:
-                owner.carries = name
+            if owner.case_name is None:
+                owner.case_name = name
                 carriers[name].append(owner)
     ordered = []
     for name, owners in carriers.items():
@@ -147,7 +151,7 @@ def _with_names(
         modes = points[place].modes
         return float(modes.frequencies[point.mode]) if modes else 0.0
 
-    others = sorted((t for t in trajectories if t.carries is None), key=first_frequency)
+    others = sorted((t for t in trajectories if t.case_name is None), key=first_frequency)
     for k, trajectory in enumerate(others, start=len(ordered) + 1):
         trajectory.name = f"mode {k}"
     return [*ordered, *others]

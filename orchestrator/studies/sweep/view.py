@@ -121,11 +121,11 @@ class ParameterSweep(NoTruth):
         """Followed modes by the values of the last axis; where there are several axes, each setting of the others."""
         plan, samples = self.result.plan, self.samples
         *others, last = range(len(plan.axes))
-        named = any(t.carries for s in self.result.scenarios for t in s.trajectories)
+        named = any(t.case_name for s in self.result.scenarios for t in s.trajectories)
         rows: dict[tuple[str, str, tuple[float, ...]], dict[int, Cell]] = {}
         for sweep in self.result.scenarios:
             for trajectory in sweep.trajectories:
-                if named and trajectory.carries is None:
+                if named and trajectory.case_name is None:
                     continue
                 for place, one in samples.of(sweep, trajectory):
                     stable = sweep.points[place].stability.get("stable")

@@ -16,7 +16,7 @@ from tests.support.scenarios import bare_scenario
 def drawn(monkeypatch):
     """Figures, in place of their files; one named curve from 40 to 60."""
     figures = []
-    trajectory = SimpleNamespace(name="tie", carries="tie")
+    trajectory = SimpleNamespace(name="tie", case_name="tie")
     sweep = SimpleNamespace(prepared=bare_scenario(title="SG + GFOR"))
     monkeypatch.setattr(plots, "_named", lambda samples: [(0, sweep, trajectory, None)])
     monkeypatch.setattr(plots, "_draw", lambda axis, *_, **__: axis.plot([1, 2], [40, 60]))
@@ -34,7 +34,7 @@ def labelled(figure: Figure):
 
 def test_numbers_beside_curves_stand_in_the_legend():
     places = {"damping": 5.0, "real": -0.2, "frequency": 0.5}
-    trajectories = [SimpleNamespace(name=f"tie {k}", carries="tie") for k in (1, 2)]
+    trajectories = [SimpleNamespace(name=f"tie {k}", case_name="tie") for k in (1, 2)]
     sweep = SimpleNamespace(
         trajectories=trajectories,
         prepared=bare_scenario(title="SG + GFOR"),
