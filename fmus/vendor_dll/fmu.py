@@ -126,7 +126,8 @@ def platform_of(path: Path, also: Sequence[str] = ()) -> str:
     here = {"linux": "linux64", "win32": "win64", "darwin": "darwin64"}.get(sys.platform)
     for mark, platform, words in _FORMATS:
         if head.startswith(mark):
-            if platform == "win64" and (other := _other_windows_machine(path)):
+            other = _other_windows_machine(path) if platform == "win64" else ""
+            if other:
                 raise DllError(
                     f"{path.name}: it is a Windows DLL {other}, and those for 64-bit x86 can be run; "
                     "ask its author for such a build"
