@@ -164,7 +164,7 @@ def alternator(m: ModelBuilder, seen: Regulated) -> Alternator:
 
 
 def exac2(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         p, behind = declared(m, EXAC2, SOURCE), alternator(m, seen)
         V_R0 = behind.V_FE_0
@@ -188,7 +188,7 @@ def exac2(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
 
 
 def esac6a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         p, behind = declared(m, ESAC6A, SOURCE), alternator(m, seen)
         V_R0, v_0 = behind.V_FE_0, seen.start.v_t
@@ -209,7 +209,7 @@ def esac6a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
 
 
 def ac8b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         p, behind = declared(m, AC8B, SOURCE), alternator(m, seen)
         V_R0 = behind.V_FE_0
@@ -229,7 +229,7 @@ def ac8b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
 
 
 def exbas(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         p, behind = declared(m, EXBAS, SOURCE), alternator(m, seen)
         V_R0 = behind.V_FE_0

@@ -111,7 +111,7 @@ ST8C = (
 
 
 def st5b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         p, limits, E_0 = declared(m, ST5B, SOURCE), declared(m, CEILINGS, SOURCE), seen.start.E_fd
         low, high = limits.V_RMIN, limits.V_RMAX
@@ -140,7 +140,7 @@ def st5b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
 
 
 def st6b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         gains, p = declared(m, PID, SOURCE, {"K_PR": 18.0, "K_IR": 45.0}), declared(m, ST6B, SOURCE)
         limits, E_0 = declared(m, CEILINGS, SOURCE), seen.start.E_fd
@@ -171,7 +171,7 @@ def st6b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
 
 
 def st7b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         p, limits, E_0 = declared(m, ST7B, SOURCE), declared(m, CEILINGS, SOURCE), seen.start.E_fd
         low, high, v_0 = limits.V_RMIN, limits.V_RMAX, seen.start.v_t
@@ -202,7 +202,7 @@ def st7b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
 
 
 def st8c(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         p, E_0 = declared(m, ST8C, SOURCE), seen.start.E_fd
         first = compound_source(m, seen, 4.0, 0.1, 99.0)

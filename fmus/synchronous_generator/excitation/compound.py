@@ -69,7 +69,7 @@ def _amplifier(m: ModelBuilder, p: Given, error: Expr, initial: Expr) -> Expr:
 
 
 def esst2a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         p, source = declared(m, (*REGULATOR, *EXCITER), SOURCE), compound_source(m, seen, 4.88, 0.3)
         high = declared(m, (pu("E_FDMAX", 5.0, "Highest field voltage"),), SOURCE).E_FDMAX
@@ -88,7 +88,7 @@ def esst2a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
 
 
 def esst3a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         wide = {"K_A": 200.0, "T_A": 0.0, "V_RMAX": 10.0, "V_RMIN": -10.0}
         p, inner = declared(m, REGULATOR, SOURCE, wide), declared(m, ESST3A, SOURCE)
@@ -114,7 +114,7 @@ def esst3a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
 
 
 def ieeet3(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         p = declared(m, (*REGULATOR, *EXCITER), SOURCE, {"V_RMAX": 6.0, "V_RMIN": -6.0})
         source = Source(declared(m, COMPOUND[:2], SOURCE, {"K_P": 2.5, "K_I": 1.2}), seen)

@@ -99,7 +99,7 @@ AC7B = (
 
 
 def expic1(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         p, E_0 = declared(m, EXPIC1, SOURCE), seen.start.E_fd
         curve = exciter_saturation(m, 2.85, 0.3, 3.8, 0.6)
@@ -146,7 +146,7 @@ def expic1(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
 
 
 def dc4b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         gains, p, E_0 = declared(m, PID, SOURCE), declared(m, DC4B, SOURCE), seen.start.E_fd
         curve = exciter_saturation(m, 2.4, 0.03, 5.0, 0.5)
@@ -170,7 +170,7 @@ def dc4b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
 
 
 def ac7b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         gains, p = declared(m, PID, SOURCE), declared(m, AC7B, SOURCE)
         behind, E_0 = alternator(m, seen), seen.start.E_fd

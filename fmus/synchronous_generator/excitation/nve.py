@@ -38,7 +38,7 @@ EXNI = (
 
 
 def exni(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         p = declared(m, EXNI, SOURCE)
         supply = Supply.declare(m)

@@ -60,7 +60,7 @@ _LEAST = 1e-3  # smallest V_E [pu] that the rectifier's loading is divided by
 def dc1a(
     m: ModelBuilder, seen: Regulated, *, compensated: bool = True, bus_fed: bool = False
 ) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu].
+    """Declare the exciter and return (E_fd, |v_t|) [pu].
 
     ``compensated``: whether it has the stage (1+sT_C)/(1+sT_B); ``bus_fed``: whether its limits are times v_t."""
     with m.scope("exciter"):
@@ -98,7 +98,7 @@ dc2a = partial(dc1a, bus_fed=True)  # DC1A fed from the machine's terminal
 def ieeet2(
     m: ModelBuilder, seen: Regulated, *, alternator: bool = False, compensated: bool = False
 ) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu].
+    """Declare the exciter and return (E_fd, |v_t|) [pu].
 
     ``alternator``: whether it is AC5A, with a lead in its rate feedback and no negative field voltage; ``compensated``:
     whether it is IEEEX2, with a lead and a lag before the amplifier."""
@@ -157,7 +157,7 @@ def _constant(m: ModelBuilder, K_E: Expr, high: Expr, curve: ExciterSaturation, 
 
 
 def ac1a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         K_A, T_A = (
             gain(m, "K_A", 400.0, "Gain", 1e-3),
@@ -194,7 +194,7 @@ def ac1a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
 
 
 def ac4a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         K_A, T_A = (
             gain(m, "K_A", 200.0, "Gain", 1e-3),

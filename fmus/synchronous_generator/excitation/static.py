@@ -67,7 +67,7 @@ SCRX = (
 
 
 def st1a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         K_A, T_A = (
             gain(m, "K_A", 200.0, "Gain", 1e-3),
@@ -131,7 +131,7 @@ class _Inner:
 
 
 def st4b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         K_PR = gain(m, "K_PR", 3.15, "Proportional gain", 0)
         K_IR = m.parameter("K_IR", 3.15, "1/s", "Integral gain", minimum=1e-6)
@@ -193,7 +193,7 @@ def _inner(m: ModelBuilder, V_M0: Expr) -> _Inner:
 
 
 def sexs(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         K = gain(m, "K", 100.0, "Gain", 1e-3)
         T_A = time(m, "T_A", 1.0, "Lead")
@@ -219,7 +219,7 @@ def sexs(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
 
 
 def scrx(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         p = declared(m, SCRX, SOURCE)
         supply = Supply.declare(m)

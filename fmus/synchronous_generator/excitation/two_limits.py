@@ -33,7 +33,7 @@ BBSEX1 = (
 
 
 def bbsex1(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         p, E_0, v_0 = declared(m, BBSEX1, SOURCE), seen.start.E_fd, seen.start.v_t
         behind = m.switch(

@@ -10,7 +10,7 @@ from fmus.toolchain.symbols import Expr
 
 
 def manual(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         E_0 = m.calculated(
             "E_fd_0", seen.start.E_fd, "pu", "Field voltage of the operating point", base="E_fd"
@@ -22,7 +22,7 @@ def manual(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
 
 
 def external(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         m.calculated(
             "E_fd_0", seen.start.E_fd, "pu", "Field voltage of the operating point", base="E_fd"
