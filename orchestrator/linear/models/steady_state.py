@@ -122,7 +122,7 @@ def _beside_stores(
     going = [
         name
         for name, change in zip(found.names, found.change.tolist(), strict=True)
-        if abs(change) > tolerance and _is_settable(master, name)
+        if abs(change) > tolerance and _may_be_store(master, name)
     ]
     reason = ""
     if going and len(going) <= _STORES:
@@ -161,8 +161,11 @@ def _beside_stores(
     )
 
 
-def _is_settable(master: Master, state: str) -> bool:
-    return master.components[state.partition(".")[0]].description.states_are_settable
+def _may_be_store(master: Master, state: str) -> bool:
+    """Return whether a state can be held beside a port; without a port that it could move, it is all there is."""
+    component = state.partition(".")[0]
+    coupled = master.exchanges[component].outputs.names
+    return bool(coupled) and master.components[component].description.states_are_settable
 
 
 def _periodic_point(
