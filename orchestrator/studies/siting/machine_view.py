@@ -64,13 +64,16 @@ class MachineSiting(PlaceRanking[MachineSites]):
         return rows(self.result)
 
     def best_table(self) -> ShownTable:
+        """Return the best machines, as the terminal shows them."""
         title = f"{UNIT}, and the angle to turn to 180°; best first"
         return _table_of(self.result, title, self.result.ranking[:_SHOWN])
 
     def page_title(self) -> str:
+        """Return the heading in a notebook."""
         return f"Machines of {self.result.case.name} as places of a POD"
 
     def page_text(self) -> str:
+        """Return the page for a browser."""
         return _page(self.result)
 
 

@@ -77,12 +77,15 @@ class Siting(PlaceRanking[SiteResult]):
         return rows(self.result)
 
     def best_table(self) -> ShownTable:
+        """Return the best buses, as the terminal shows them."""
         return ranking_table(self.result)
 
     def page_title(self) -> str:
+        """Return the heading in a notebook."""
         return f"Siting in {self.result.case.name}"
 
     def page_text(self) -> str:
+        """Return the page for a browser."""
         return _page(self.result)
 
 
