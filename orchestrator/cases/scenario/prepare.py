@@ -37,6 +37,7 @@ from orchestrator.cases.scenario.case_network import (
 from orchestrator.cases.scenario.catalogue_fmus import PlannedFmu, build_fmu, plan_fmu
 from orchestrator.cases.scenario.drawing_devices import with_motors
 from orchestrator.cases.scenario.operating_point import power_flow_of
+from orchestrator.cases.scenario.protection_relays import relays_of
 from orchestrator.cases.scenario.run_plan import (
     check_length,
     checked_schedule,
@@ -57,6 +58,7 @@ from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.instance import is_ours
 from orchestrator.systems.coupling.events import Event
+from orchestrator.systems.coupling.relays import Relay
 from orchestrator.systems.coupling.schedule import (
     SECOND_ORDER,
     Schedule,
@@ -128,6 +130,7 @@ class PreparedScenario:
     idle: Idle = field(default_factory=dict, repr=False)
     changed: str = ""  # what parameter files and the caller set, in few words
     not_reached: tuple[float, ...] = ()  # times of events for which the run stops too early [s]
+    relays: tuple[Relay, ...] = ()  # of units and loads, by the network's dynamics data
     faults: tuple[SolvedFault, ...] = ()  # of fewer phases than three, and poles that open
 
     @cached_property
@@ -306,6 +309,7 @@ class Preparer:
         check_length(draft, clock, stop)
         imperfections = disturb_connections(draft, clock, stop) if clock is not None else {}
         events = scenario_events(draft, clock, stop, flow)
+        relays = relays_of(draft, flow)
         schedule = checked_schedule(draft)
         references = references_of(draft, imperfections)
         if draft.found.problems or clock is None:
@@ -336,6 +340,7 @@ class Preparer:
             record=record,
             record_every=every,
             events=events,
+            relays=relays,
             power_flow=flow,
             values={f"{n}.{v}": x for n, p in plans.items() for v, x in p.parameters.items()}
             | imperfections,

@@ -43,6 +43,7 @@ from orchestrator.cases.networks.source_ratings import with_needed_ratings
 from orchestrator.cases.networks.unit_row import UnitRow, checked
 from orchestrator.cases.questions.plausibility import question
 from orchestrator.cases.scenario.motor_components import motor_components, take_motors
+from orchestrator.cases.scenario.protection_relays import take_relays
 from orchestrator.cases.scenario.recorded_loads import take_frequency, take_laws
 from orchestrator.core.errors import InputError, Problem, few
 
@@ -383,10 +384,12 @@ def _account(
     wanted = [record for record in records if record.name not in left]
     taken = take_laws(draft, wanted) | take_frequency(draft, wanted)
     taken |= motors.places
+    relays = take_relays(draft, wanted)
+    taken |= relays.places
     uses = [
         replace(use, use=UseOfRecord.USED, why="", of_no_machine=False)
         if (use.file, use.line) in taken
-        else use
+        else replace(use, why=relays.unused.get((use.file, use.line), use.why))
         for use in uses
     ]
     draft.found.records += uses

@@ -16,6 +16,7 @@ Kind = Literal[
     "not_finite",
     "failure",
     "misfit",
+    "trip",
 ]
 
 UNSTABLE: frozenset[Kind] = frozenset(
@@ -35,6 +36,9 @@ be, or the run ends too early after an event; ``misfit`` is of a device and its 
 MISFIT: Kind = "misfit"
 
 NOT_JUDGED: Kind = "not_judged"
+
+TRIP: Kind = "trip"
+"""Kind of finding of a relay that acted; what it does to the system, the others tell."""
 
 
 @dataclass(frozen=True, slots=True)

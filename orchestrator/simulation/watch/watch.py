@@ -15,6 +15,7 @@ from orchestrator.devices.binding.misfits import Misfit
 from orchestrator.simulation.watch.confirmation import KnownModes
 from orchestrator.simulation.watch.finding import MISFIT, UNSTABLE, Finding, Kind
 from orchestrator.simulation.watch.limits import above_declared, active_limits, limit_signals
+from orchestrator.simulation.watch.relay_trips import finding_of
 from orchestrator.simulation.watch.response import (
     enough_looks,
     judgements,
@@ -37,6 +38,7 @@ from orchestrator.systems.coupling.coupled import LateStart
 from orchestrator.systems.coupling.events import Event
 from orchestrator.systems.coupling.filtered_recorder import FilteredRecorder
 from orchestrator.systems.coupling.recorder import Recorder, RowSink
+from orchestrator.systems.coupling.relays import Trip
 from orchestrator.systems.coupling.system import System
 
 SETTLING = 2.0
@@ -151,24 +153,32 @@ class Watch:
         misfits: Mapping[str, Sequence[Misfit]] = MappingProxyType({}),
         modes: Sequence[complex] = (),
         later: Sequence[complex] = (),
+        trips: Sequence[Trip] = (),
     ) -> list[Finding]:
         """The findings, in the order of their beginning; available after the run, even after one that failed.
 
         ``misfits``: Of devices and their bindings, by component.
         ``modes``, ``later``: Eigenvalues of the linear model at the start, and of that which the events leave [rad/s];
-        empty if not all are known."""
+        empty if not all are known.
+        ``trips``: what relays did in the run."""
+        events = [*self._prepared.events, *(event for trip in trips for event in trip.events)]
         seen = rescaled(
             self._watcher.seen(self.recorder if self._looks_at_records else None), misfits
         )
         whole = failure is None
         system = self._prepared.system
         told = (
-            judge_run(seen, system, self._prepared.events, modes, later, whole=whole)
+            judge_run(seen, system, events, modes, later, whole=whole)
             if len(seen.times) > 1
             else ()
         )
         found = chain(
-            _late(late_starts or {}), _failure(failure), _not_finite(seen), _misfits(misfits), told
+            _late(late_starts or {}),
+            _failure(failure),
+            _not_finite(seen),
+            _misfits(misfits),
+            map(finding_of, trips),
+            told,
         )
         return sorted(found, key=lambda finding: finding.time)
 

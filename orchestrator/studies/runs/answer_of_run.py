@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil
 
-from orchestrator.core.errors import RunInterruptedError
+from orchestrator.core.errors import RunInterruptedError, few
 from orchestrator.core.options import Option
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.output.report.tables import short
@@ -32,6 +32,8 @@ _NO_RUN_NEEDED = 4.0
 _PERIODS_OF_A_SLOW_GROWTH = 30
 """Periods in which a run shows whether a mode grows that hardly decays."""
 
+_TRIPS_NAMED = 2  # trips of relays that an answer names; the others are counted
+
 KINDS = {
     "growth": "grows",
     "growing_oscillation": "an oscillation grows",
@@ -46,6 +48,19 @@ KINDS = {
 
 def of_run(result: RunResult) -> ScenarioAnswer:
     """Return the answer of a run by what it showed, and by the eigenvalues before its events and after them."""
+    return _with_trips(_of_run(result), result)
+
+
+def _with_trips(answer: ScenarioAnswer, result: RunResult) -> ScenarioAnswer:
+    """Return the answer with who was tripped, before all else that it remarks."""
+    if not result.trips:
+        return answer
+    told = [f"{trip.relay.of} at {trip.time:.4g} s" for trip in result.trips]
+    remark = f"relays trip {few(list(dict.fromkeys(told)), _TRIPS_NAMED)}; {answer.remark}"
+    return replace(answer, remark=short(remark, LONGEST_REMARK))
+
+
+def _of_run(result: RunResult) -> ScenarioAnswer:
     answer = _by_response(result)
     after = result.after
     if not isinstance(after, ModesResult):

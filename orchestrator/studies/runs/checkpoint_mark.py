@@ -47,6 +47,7 @@ def mark_of(prepared: PreparedScenario) -> dict[str, str]:
         "the stop time": f"{prepared.stop_time!r} s",
         "the schedule": f"{prepared.schedule.name}: {groups}{tolerance}",
         _EVENTS: "; ".join(map(str, prepared.events)),
+        "the relays": "; ".join(map(str, prepared.relays)),
         "what is recorded": f"every {prepared.record_every} steps, "
         f"{'filtered' if prepared.record_filtered else 'as it is'}: {', '.join(prepared.record)}",
     }

@@ -44,6 +44,7 @@ from orchestrator.studies.runs.checkpoints import Checkpoints
 from orchestrator.studies.runs.ring_down import ring_down_of
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.observers import Observer
+from orchestrator.systems.coupling.relays import Relays, Trip
 from orchestrator.systems.coupling.run_state import NOT_KEPT
 from orchestrator.systems.coupling.schedule import jacobi
 from orchestrator.systems.coupling.statistics import StepStatistics
@@ -80,6 +81,7 @@ class RunResult:
     failure: CosimError | None = None  # the error that ended the run before its time
     # what the run did wrong, each said once, in the order of its beginning
     findings: list[Finding] = field(default_factory=list)
+    trips: list[Trip] = field(default_factory=list)  # what relays did
     # what kept each foreign FMU from the rest of the machine, by component
     protections: dict[str, tuple[Protection, ...]] = field(default_factory=dict)
     after: ModesResult | str | None = None  # as `modes_after` has it
@@ -179,6 +181,8 @@ def _run(
     statistics = None
     failure: CosimError | None = None
     after = modes_after(prepared, frequency_range)
+    relays = Relays(prepared.relays, prepared.step_size)
+    guards = [relays] if prepared.relays else []
     with running(prepared, engine, threads) as master:
         protections = {
             name: found for name, c in master.components.items() if (found := protections_of(c))
@@ -204,7 +208,7 @@ def _run(
             statistics = master.run(
                 prepared.stop_time,
                 prepared.events,
-                [*watch.observers, *observers],
+                [*watch.observers, *guards, *observers],
                 checkpoints or NOT_KEPT,
             )
         except NotTakenUpError:
@@ -213,12 +217,16 @@ def _run(
             failure = error
         except KeyboardInterrupt:
             failure = RunInterruptedError(f"{calls.how} at t = {master.time:.6g} s")
+    trips = relays.trips
+    if trips:
+        prepared = with_trips(prepared, trips)
+        modes, after = replace(modes, prepared=prepared), modes_after(prepared, frequency_range)
     dataset, failure = _recorded(watch, prepared, recording, failure)
     known, later = (
         () if not isinstance(r, ModesResult) or r.fit_errors else r.eigenvalues
         for r in (modes, after)
     )
-    findings = watch.findings(failure, master.late_starts, modes.misfits, known, later)
+    findings = watch.findings(failure, master.late_starts, modes.misfits, known, later, trips=trips)
     ring_down, why_none = (None, "") if failure else ring_down_of(modes, dataset, findings, after)
     unprotected = tuple(
         f"{name} runs in a process of its own, and this system lacks: {'; '.join(lacking)}"
@@ -254,7 +262,14 @@ def _run(
         findings=findings,
         protections=protections,
         after=after,
+        trips=trips,
     )
+
+
+def with_trips(prepared: PreparedScenario, trips: Sequence[Trip]) -> PreparedScenario:
+    """Return a scenario with the events of relays among its own: all that happened in its run."""
+    events = [*prepared.events, *(event for trip in trips for event in trip.events)]
+    return replace(prepared, events=tuple(sorted(events, key=lambda event: event.time)))
 
 
 def _with_obstacles(engine: Engine) -> Callable[[Component], str | None]:

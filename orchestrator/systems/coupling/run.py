@@ -19,6 +19,7 @@ from orchestrator.devices.fmi.isolation import IsolatedComponent
 from orchestrator.systems.coupling.events import Event, NotANumber, Silence, WireFault, WireRecovery
 from orchestrator.systems.coupling.kept_form import check_form, of_this_run
 from orchestrator.systems.coupling.observers import Observer
+from orchestrator.systems.coupling.relays import Relays
 from orchestrator.systems.coupling.run_state import (
     Keeper,
     Resumable,
@@ -54,6 +55,7 @@ _LONGEST_STRETCH = 1000
 class Run:
     def __init__(self, stepper: Stepper, observers: Sequence[Observer], keeper: Keeper) -> None:
         self._stepper, self._observers, self._keeper = stepper, observers, keeper
+        self._relays = [one for one in observers if isinstance(one, Relays)]
         self._whole = False  # whether every observer has looked at this communication point
         self._applied = -1  # the last communication point whose events have happened
 
@@ -119,6 +121,7 @@ class Run:
                 self._whole = False
                 with calls:
                     self._apply(due[target])
+                    self._look_again()
                     self._whole, self._applied = True, target
 
     def _run_to(self, target: int, first: int) -> Iterator[None]:
@@ -141,8 +144,15 @@ class Run:
                 for observer in observers:
                     if done % observer.every == 0:
                         observer.observe(stepper)
+                for relays in self._relays:
+                    self._apply(relays.ordered(stepper))
                 self._whole = True
             yield
+
+    def _look_again(self) -> None:
+        """Let relays see what an event changed, from which their times count."""
+        for relays in self._relays:
+            relays.observe(self._stepper)
 
     def _apply(self, events: Sequence[Event]) -> None:
         for event in events:

@@ -25,12 +25,12 @@ from orchestrator.cases.networks.psse.machine_model import (
     plant_of,
 )
 from orchestrator.cases.networks.psse.missing_models import (
-    LOAD,
     MissingModel,
     in_words,
     is_own,
     kind_of,
     missing_models,
+    names_load,
 )
 from orchestrator.cases.networks.psse.plant_points import measured_points
 from orchestrator.cases.networks.psse.raw_network import Machine, unit_labels
@@ -66,7 +66,7 @@ def machine_models(
     left = {name.upper() for name in leaving_out}
     _refuse_absent(leaving_out, records)
     # a load may have the identifier of the machine at its bus
-    records = [record for record in records if kind_of(record.name) != LOAD]
+    records = [record for record in records if not names_load(record.name)]
     labels = unit_labels(machines)
     of: dict[tuple[int, str], list[DynamicRecord]] = {key: [] for key in at}
     # machines whose own record no part stands for

@@ -21,6 +21,18 @@ _OWN_MODELS = (
 )  # a user's model of a machine or a load: its name is the first value
 
 
+NUMBERED = ("VTGTPAT", "VTGDCAT", "FRQTPAT", "FRQDCAT")
+"""Relays whose records begin with a number of their own, where others have a bus."""
+
+_BEFORE_ICONS = (
+    6  # numbers of a user's model: its two codes, and how many of four kinds of values there are
+)
+_ICONS = 2  # place of the number of whole values among these
+_CONS = 3  # place of the number of other values
+_OF_NUMBERED = 3  # whole values of a relay: the bus watched, the generator's bus, its identifier
+_LIMITS = 4  # other values: two limits and two times
+
+
 @dataclass(frozen=True)
 class DynamicRecord:
     file: str
@@ -82,7 +94,20 @@ def _record(file: str, line: int, tokens: Sequence[str], names: int) -> DynamicR
     name, machine, values = tokens[1].upper(), tokens[2].strip(), tuple(tokens[3:])
     if name in _OWN_MODELS and values:
         name, values = values[0].upper(), values[1:]
+        if f"{name}T" in NUMBERED:
+            return DynamicRecord(file, line, 0, f"{name}T", "", _of_users_relay(values))
+    if name in NUMBERED:
+        return DynamicRecord(file, line, 0, name, "", (machine, *values))
     return DynamicRecord(file, line, int(tokens[0]), name, machine, values)
+
+
+def _of_users_relay(values: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the values of a relay that is written as a user's model; all as they are where they are not these."""
+    counts, rest = values[:_BEFORE_ICONS], values[_BEFORE_ICONS:]
+    if len(counts) < _BEFORE_ICONS or not all(text.isdigit() for text in counts):
+        return values
+    first = int(counts[_ICONS])
+    return (*rest[:first][:_OF_NUMBERED], *rest[first : first + int(counts[_CONS])][:_LIMITS])
 
 
 def given_values(

@@ -3,14 +3,14 @@
 from collections.abc import Collection, Sequence
 
 from fmus.grid_following.dyr_fields import FIELDS, MODEL
-from orchestrator.cases.networks.psse.dyr_records import EVENT, DynamicRecord
+from orchestrator.cases.networks.psse.dyr_records import EVENT, NUMBERED, DynamicRecord
 from orchestrator.cases.networks.psse.machine_model import MANUAL
 from orchestrator.cases.networks.psse.missing_models import (
-    LOAD,
     OF_MACHINES,
     RESTS,
     is_resting,
     kind_of,
+    names_load,
 )
 from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
 
@@ -61,8 +61,8 @@ def _use_of(
 ) -> tuple[UseOfRecord, str, bool]:
     """Return what became of a record, why, and whether it is of no machine."""
     key = record.bus, record.machine
-    of_load = kind_of(record.name) == LOAD  # whose identifier is a load's
-    if of_load and record.name in left:
+    of_load = names_load(record.name)
+    if (of_load or record.name in NUMBERED) and record.name in left:
         return UseOfRecord.NOT_USED, "dyr_leave_out names it", False
     if key in machines and not of_load:
         if record.name in left:

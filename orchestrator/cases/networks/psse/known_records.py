@@ -15,9 +15,11 @@ from fmus.synchronous_generator.dyr_fields import DYR_RECORDS, DyrRecord
 from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
 from orchestrator.cases.networks.psse.composite_loads import COMPOSITE_NAMES
 from orchestrator.cases.networks.psse.composite_loads import MODEL as MODEL_OF_MOTORS
+from orchestrator.cases.networks.psse.dyr_records import NUMBERED
 from orchestrator.cases.networks.psse.frequency_records import FREQUENCY_RECORDS
 from orchestrator.cases.networks.psse.load_records import LOAD_RECORDS
 from orchestrator.cases.networks.psse.motor_loads import MOTOR_NAMES
+from orchestrator.cases.networks.psse.relay_records import LOAD_RELAYS, OF_BUSES
 
 _LIBRARY = "PSS/E's model library as PowerWorld's and NEPLAN's guides and ANDES' reader describe it"
 _REGFM = "WECC's specification of REGFM_A1"
@@ -26,6 +28,9 @@ _LOADS = "GridPACK's reader and model"
 _DISTRIBUTED = "WECC's specification of DER_A; fields as PowerSystems.jl lists PSS/E's"
 _INDUCTION = "PowerWorld's guide to PSS/E's machine models"
 _FREQUENCY = "PowerWorld's guide to PSS/E's load models"
+_RELAYS = "PowerWorld's guide to PSS/E's relay models; fields as InterPSS and GridPACK read them"
+_OF_BUS = "three-winding transformers at the bus stay on"
+_NOT_SHED = "a load for which motors stand keeps its power"
 _COMPOSITE = "WECC's composite load model; fields as InterPSS reads them"
 _LEFT_OUT = "motors A to C by their share, the rest a load; feeder, trips, stalling left out"
 _MOTORS = "PowerWorld's guide to PSS/E's load models, and STEPS' reader"
@@ -93,6 +98,15 @@ def known_records() -> list[KnownRecord]:
     found += [
         KnownRecord(name, "converter", record.part, _DISTRIBUTED, "; ".join(_limits(record)))
         for name, record in DISTRIBUTED_RECORDS.items()
+    ]
+    found += [
+        KnownRecord(name, "relay", "unit_trip", _RELAYS, _OF_BUS if name in OF_BUSES else "")
+        for name in NUMBERED
+    ]
+    found += [
+        KnownRecord(name, "relay", "load_change", _RELAYS, _NOT_SHED)
+        for names in LOAD_RELAYS.values()
+        for name in names
     ]
     by_name = _peers()
     return [replace(r, held_against=by_name.get(r.name, _BY_HAND)) for r in found]

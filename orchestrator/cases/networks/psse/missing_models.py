@@ -99,6 +99,17 @@ def kind_of(name: str) -> str:
     return _kinds().get(name, UNKNOWN)
 
 
+_RELAY = "relay"
+_RELAYS_OF_LOADS = ("LVSH", "LDSH", "LVS3", "LDS3", "LDST", "LVDT", "UVUF")
+"""How the names of relays begin that shed load."""
+
+
+def names_load(name: str) -> bool:
+    """Return whether the identifier of a model's record is a load's, which may be that of the machine at its bus."""
+    kind = kind_of(name)
+    return kind == LOAD or (kind == _RELAY and name.startswith(_RELAYS_OF_LOADS))
+
+
 RESTS = "a limiter of excitation, taken to rest at the operating point"
 _RESTING = ("MAXEX", "MNLEX", "UEL", "OEL", "SCL")
 """How the names of limiters of excitation begin, which rest at an operating point within their limits."""

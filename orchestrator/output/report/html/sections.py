@@ -38,6 +38,7 @@ _KINDS = {
     "active_limit": "active limit",
     "loss_of_synchronism": "loss of synchronism",
     "not_judged": "not judged",
+    "trip": "a relay trips",
     "not_finite": "not a number",
 }
 

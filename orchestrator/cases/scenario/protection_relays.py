@@ -1,0 +1,194 @@
+"""Relays of a scenario: which records of a DYR file have one here, and what it orders in a run."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from orchestrator.cases.draft import Draft
+from orchestrator.cases.flow.power_flow import PowerFlow
+from orchestrator.cases.networks.data import bus_name
+from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
+from orchestrator.cases.networks.psse.raw_network import unit_labels
+from orchestrator.cases.networks.psse.relay_records import (
+    LoadRelay,
+    UnitRelay,
+    load_relays,
+    unit_relays,
+)
+from orchestrator.core.errors import Problem, QuestionTopic
+from orchestrator.systems.coupling.events import Event, LineSwitching, UnitSwitching
+from orchestrator.systems.coupling.relays import RATED_FREQUENCY, Relay, Shedding
+
+_UNIT_KINDS = ("sg", "gfor")  # first parts of the names of a unit's generator and converter
+_RATED = "f_n"  # parameter with a device's rated frequency [Hz]
+_UNITS = {"voltage": "pu", "frequency": "Hz"}
+
+Place = tuple[str, int]
+"""File and line of a record."""
+
+
+@dataclass(frozen=True)
+class TakenRelays:
+    """Places of the records that a relay stands for, and why others of relays have none."""
+
+    places: frozenset[Place]
+    unused: Mapping[Place, str]
+
+
+def take_relays(draft: Draft, records: Sequence[DynamicRecord]) -> TakenRelays:
+    """Give the draft the relays of its units and loads; a record of none is accounted for."""
+    data = draft.data
+    if data is None:
+        return TakenRelays(frozenset(), {})
+    labels = unit_labels(data.machines)
+    taken: list[tuple[str, UnitRelay]] = []
+    unused: dict[Place, str] = {}
+    for relay in unit_relays(records):
+        bus, name = relay.machine
+        label = labels.get(relay.machine)
+        if label is None:
+            why = f"a relay of the machine {name!r} at bus {bus}, which is not in service"
+            unused[_place(relay.record)] = why
+        elif bus_name(str(relay.watched)) not in data.buses:
+            unused[_place(relay.record)] = f"a relay of bus {relay.watched}, which is no bus here"
+        else:
+            taken.append((label, relay))
+    loads = {load.name for load in data.loads}
+    of_loads = [
+        relay
+        for relay in load_relays(records, data.file_loads)
+        if relay.load.load in loads and bus_name(str(relay.watched)) in data.buses
+    ]
+    draft.unit_relays, draft.load_relays = taken, of_loads
+    used = [*(relay.record for _, relay in taken), *(relay.record for relay in of_loads)]
+    return TakenRelays(frozenset(map(_place, used)), unused)
+
+
+def _place(record: DynamicRecord) -> Place:
+    return record.file, record.line
+
+
+def relays_of(draft: Draft, flow: PowerFlow | None) -> tuple[Relay, ...]:
+    """Return the relays of what is in the scenario, and ask about those that trip at the operating point."""
+    grid = draft.grid
+    if grid is None or grid not in draft.system.components or draft.found.problems:
+        return ()
+    f_n = _rated_frequency(draft)
+    found: list[Relay] = []
+    for label, unit in draft.unit_relays:
+        orders = _orders_of_unit(draft, grid, label, unit)
+        if orders:
+            named = bus_name(str(unit.machine[0])) if unit.is_of_bus else label
+            relay = Relay(
+                unit.record.name,
+                _name_of(draft, named),
+                grid,
+                bus_name(str(unit.watched)),
+                unit.quantity,
+                unit.limits,
+                orders=orders,
+                f_n=f_n,
+            )
+            found.append(relay)
+            _ask(draft, relay, flow, unit.record)
+    for stage in draft.load_relays:
+        shed = _shedding(draft, grid, stage)
+        if shed is not None:
+            relay = Relay(
+                stage.record.name,
+                stage.load.load,
+                grid,
+                bus_name(str(stage.watched)),
+                stage.quantity,
+                stage.limits,
+                orders=(shed,),
+                f_n=f_n,
+            )
+            found.append(relay)
+            _ask(draft, relay, flow, stage.record)
+    return tuple(found)
+
+
+def _rated_frequency(draft: Draft) -> float:
+    plans = draft.system.components.values()
+    rated = (plan.number(_RATED) for plan in plans if _RATED in plan.description.variables)
+    return next(rated, RATED_FREQUENCY)
+
+
+def _name_of(draft: Draft, label: str) -> str:
+    """Return the component of a unit's label; a bus as it is."""
+    names = (f"{kind}{label}" for kind in _UNIT_KINDS)
+    return next((name for name in names if name in draft.system.components), label)
+
+
+def _orders_of_unit(draft: Draft, grid: str, label: str, relay: UnitRelay) -> tuple[Event, ...]:
+    if relay.is_of_bus:
+        return tuple(_bus_off(draft, grid, bus_name(str(relay.machine[0]))))
+    names = [f"{kind}{label}" for kind in _UNIT_KINDS]
+    return tuple(_unit_off(draft, grid, name) for name in names if name in draft.system.components)
+
+
+def _unit_off(draft: Draft, grid: str, name: str) -> UnitSwitching:
+    plan = draft.system.components.get(name)
+    has_breaker = plan is not None and "connected" in plan.description.variables
+    return UnitSwitching(0.0, grid, name, False, has_breaker)
+
+
+def _bus_off(draft: Draft, grid: str, bus: str) -> Iterator[Event]:
+    """Yield the events that leave a bus without units and lines; its loads draw nothing at no voltage."""
+    network = draft.network
+    if network is None:
+        return
+    for port in network.ports:
+        if port.bus == bus:
+            yield _unit_off(draft, grid, port.name)
+    for line in network.lines:
+        if bus in (line.from_bus, line.to_bus):
+            yield LineSwitching(0.0, grid, line.name, False)
+
+
+def _may_be_zero(draft: Draft, grid: str, load: str) -> bool:
+    scale = draft.system.components[grid].description.variables.get(f"{load}.scale")
+    return scale is not None and not scale.minimum
+
+
+def _shedding(draft: Draft, grid: str, stage: LoadRelay) -> Shedding | None:
+    """Return what a stage takes off; nothing of a load that the grid cannot be without."""
+    load = next(
+        (x for x in (draft.network.loads if draft.network else ()) if x.name == stage.load.load),
+        None,
+    )
+    if load is None or not load.p_mw > 0:
+        return None
+    if not _may_be_zero(draft, grid, load.name):
+        text = (
+            f"{stage.record.name} does not shed {load.name}: nothing else determines the voltage of its bus; give a "
+            "line there some charging B"
+        )
+        topic = QuestionTopic("a relay that cannot shed its load", load.name)
+        draft.found.questions.append(Problem(stage.record.place, text, topic=topic))
+        return None
+    part = stage.load.drawn.real / load.p_mw
+    return Shedding(grid, load.name, min(1.0, part * stage.share))
+
+
+def _ask(draft: Draft, relay: Relay, flow: PowerFlow | None, record: DynamicRecord) -> None:
+    """Ask about a relay that is beyond a limit at the operating point, and so trips in every run."""
+    voltage = None if flow is None else flow.voltages.get(relay.bus)
+    if relay.quantity == "frequency":
+        rests = relay.f_n
+    elif voltage is not None:
+        rests = abs(voltage)
+    else:
+        return
+    limits = relay.limits
+    if limits.low <= rests <= limits.high:
+        return
+    unit = _UNITS[relay.quantity]
+    side = f"below {limits.low:g}" if rests < limits.low else f"above {limits.high:g}"
+    text = (
+        f"{record.name} of {relay.of}: the {relay.quantity} of {relay.bus} rests at {rests:.4g} {unit}, {side} {unit}, "
+        f"so that it trips {limits.delay + limits.opening:g} s after the start of any run; correct its limit, or "
+        f"leave it out: dyr_leave_out = ['{record.name}'] in [units]"
+    )
+    topic = QuestionTopic("a relay beyond its limit at rest", relay.of)
+    draft.found.questions.append(Problem(record.place, text, topic=topic))

@@ -1,0 +1,206 @@
+"""Relays that watch a bus in a run and order events: trips of units, of buses, and shedding of loads.
+
+A relay picks up at a look at which its quantity is beyond a limit, and forgets that at one at which it is not. After
+its delay it orders its events, which happen when the breaker has opened; then nothing takes the order back."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import atan2, exp, hypot, inf, pi
+from typing import Any, Literal
+
+import numpy as np
+
+from orchestrator.core.arrays import Numbers
+from orchestrator.devices.fmi.component import RealBatch
+from orchestrator.systems.coupling.events import Event, LoadChange, UnitSwitching
+from orchestrator.systems.coupling.observers import ObservedRun
+
+Quantity = Literal["voltage", "frequency"]
+
+LOOK_EVERY = 1e-3
+"""Time between two looks of the relays [s], a small part of the shortest delay that a relay of a planner's file has."""
+
+FREQUENCY_LAG = 0.04
+"""Lag of the frequency of a bus behind the speed of its angle [s]: two cycles of 50 Hz, as a meter averages."""
+
+LEAST_VOLTAGE = 0.05
+"""Voltage [pu] below which the angle of a bus says nothing; its frequency stays what it was."""
+
+RATED_FREQUENCY = 50.0  # [Hz], where no component has one of its own
+
+_ROUND_OFF = 1e-6  # part of a step by which a sum of times may miss a communication point
+_GONE = 1e-9  # share of a load that counts as none
+_COLUMNS = 7
+_PICKED_UP, _DECIDED, _SEEN, _ANGLE, _SLIP, _OPENED, _SCALE = range(_COLUMNS)
+"""Numbers of a relay in a run: times [s] at which it picked up, tripped, and had its events happen; what it saw when it
+tripped; angle [rad] and frequency beside the rated one [Hz]; scale of its load after it shed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shedding:
+    """A share of a load that a stage of a relay takes off, as a part of the load that the run begins with."""
+
+    component: str
+    load: str
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class RelayLimits:
+    """Limits of a voltage [pu] or a frequency [Hz], −∞ and ∞ where there is none, and times [s].
+
+    ``delay``: time beyond a limit after which the relay trips; ``opening``: time of the breaker after that."""
+
+    low: float
+    high: float
+    delay: float
+    opening: float
+
+
+@dataclass(frozen=True, slots=True)
+class Relay:
+    """One relay: the bus of a grid that it watches, its limits, and what it orders.
+
+    ``record``: name of its record; ``of``: the unit, load or bus that it protects; ``component``: the grid.
+    ``f_n``: rated frequency [Hz]."""
+
+    record: str
+    of: str
+    component: str
+    bus: str
+    quantity: Quantity
+    limits: RelayLimits
+    orders: tuple[Event | Shedding, ...]
+    f_n: float = RATED_FREQUENCY
+
+
+@dataclass(frozen=True, slots=True)
+class Trip:
+    """Orders of a relay that were carried out.
+
+    ``time``: when the breaker opened; ``picked_up``: since when the quantity was beyond a limit; ``decided``: when the
+    relay tripped [s]; ``seen``: voltage [pu] or frequency [Hz] then."""
+
+    relay: Relay
+    time: float
+    picked_up: float
+    decided: float
+    seen: float
+    events: tuple[Event, ...]
+
+
+class Relays:
+    """All relays of a run: an observer that orders events."""
+
+    def __init__(self, relays: Sequence[Relay], step_size: float) -> None:
+        self.relays = tuple(relays)
+        self.every = max(1, round(LOOK_EVERY / step_size))
+        self._least = _ROUND_OFF * step_size
+        self._state = np.full((len(self.relays), _COLUMNS), inf)
+        self._state[:, [_SEEN, _ANGLE, _SLIP, _SCALE]] = 0.0
+        self._looked: float | None = None  # time of the last look [s]
+        self._batches: list[RealBatch] = []
+
+    @property
+    def trips(self) -> list[Trip]:
+        """Return what the relays did so far, in the order of time."""
+        opened = self._state[:, _OPENED]
+        found: list[Trip] = []
+        for k in sorted(np.flatnonzero(np.isfinite(opened)).tolist(), key=opened.__getitem__):
+            picked_up, decided, seen = self._state[k, [_PICKED_UP, _DECIDED, _SEEN]].tolist()
+            events = self._events_of(k, found)
+            if events:
+                time = float(opened[k])
+                found.append(Trip(self.relays[k], time, picked_up, decided, seen, events))
+        return found
+
+    def begin(self, run: ObservedRun, stop_index: int) -> None:
+        """Find the voltages of the buses."""
+        self._batches = [
+            RealBatch(run.components[x.component], [f"{x.bus}.v_re", f"{x.bus}.v_im"])
+            for x in self.relays
+        ]
+
+    def observe(self, run: ObservedRun) -> None:
+        """Look at the buses; a second look at one communication point sees what an event changed there."""
+        elapsed = 0.0 if self._looked is None else run.time - self._looked
+        for relay, batch, own in zip(self.relays, self._batches, self._state, strict=True):
+            re, im = batch.read().tolist()
+            value = hypot(re, im)
+            if relay.quantity == "frequency":
+                _follow_angle(own, atan2(im, re), elapsed if value > LEAST_VOLTAGE else 0.0)
+                value = relay.f_n + float(own[_SLIP])
+            if own[_DECIDED] == inf:
+                self._judge(relay.limits, own, value, run.time)
+        self._looked = run.time
+
+    def end(self, run: ObservedRun) -> None:
+        """See `Observer.end`."""
+
+    def _judge(self, limits: RelayLimits, own: Numbers, value: float, time: float) -> None:
+        if limits.low <= value <= limits.high:
+            own[_PICKED_UP] = inf
+            return
+        own[_PICKED_UP] = min(own[_PICKED_UP], time)
+        if time - own[_PICKED_UP] >= limits.delay - self._least:
+            own[_DECIDED], own[_SEEN] = time, value
+
+    def ordered(self, run: ObservedRun) -> list[Event]:
+        """Return the events of the relays whose breakers open now."""
+        found: list[Event] = []
+        for k, relay in enumerate(self.relays):
+            own = self._state[k]
+            opens = own[_DECIDED] + relay.limits.opening - self._least
+            if own[_OPENED] < inf or run.time < opens:
+                continue
+            before = self.trips
+            for order in relay.orders:
+                if isinstance(order, Shedding):
+                    own[_SCALE] = _scale_after(order, before, run)
+            own[_OPENED] = run.time
+            found += self._events_of(k, before)
+        return found
+
+    def _events_of(self, k: int, before: Sequence[Trip]) -> tuple[Event, ...]:
+        """Return the events of a relay without those of units that trips before have taken off."""
+        time, scale = self._state[k, [_OPENED, _SCALE]].tolist()
+        off = {e.unit for trip in before for e in trip.events if isinstance(e, UnitSwitching)}
+        found: list[Event] = []
+        for order in self.relays[k].orders:
+            if isinstance(order, Shedding):
+                found.append(LoadChange(time, order.component, order.load, scale))
+            elif not (isinstance(order, UnitSwitching) and order.unit in off):
+                found.append(replace(order, time=time))
+        return tuple(found)
+
+    def position(self) -> dict[str, Any]:
+        """See `Resumable.position`."""
+        return {"relays": self._state.copy(), "looked": self._looked or 0.0}
+
+    def resume(self, position: Mapping[str, Any]) -> None:
+        """See `Resumable.resume`."""
+        self._state[:] = position["relays"]
+        self._looked = float(position["looked"])
+
+
+def _follow_angle(own: Numbers, angle: float, elapsed: float) -> None:
+    """Move the filtered frequency by what the angle moved in a time [s]; the jump of an event takes none."""
+    turned = (angle - own[_ANGLE] + pi) % (2 * pi) - pi
+    own[_ANGLE] = angle
+    if elapsed > 0:
+        kept = exp(-elapsed / FREQUENCY_LAG)
+        own[_SLIP] = kept * own[_SLIP] + (1 - kept) * turned / (2 * pi * elapsed)
+
+
+def _scale_after(order: Shedding, before: Sequence[Trip], run: ObservedRun) -> float:
+    """Return the scale of a load without a share of it, whatever else changed the load."""
+    shed = sum(
+        done.share
+        for trip in before
+        for done in trip.relay.orders
+        if isinstance(done, Shedding) and done.load == order.load
+    )
+    (now,) = RealBatch(run.components[order.component], [f"{order.load}.scale"]).read().tolist()
+    left = 1.0 - shed
+    scale = now * (left - order.share) / left if left > _GONE else 0.0
+    return float(scale) if scale > _GONE else 0.0
