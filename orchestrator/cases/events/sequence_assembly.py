@@ -15,6 +15,7 @@ from fmus.grid.network import Network
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.flow.balance import FlowLine
+from orchestrator.cases.flow.induction_impedances import negative_admittance
 from orchestrator.cases.flow.power_flow import PowerFlow
 from orchestrator.cases.flow.sequence_networks import SequenceNetwork
 from orchestrator.cases.flow.source_impedances import (
@@ -298,8 +299,12 @@ class SequenceAssembly:
     def _add_unit(self, name: str, bus: str, plan: ComponentPlan) -> None:
         external = external_impedance(plan)
         machine = machine_impedance(plan)
+        power, voltage = self.flow.powers.get(name, 0j), abs(self.flow.voltages[bus])
+        induction = negative_admittance(plan, -power, voltage)
         if machine is not None:
             self._add_machine(name, bus, plan, machine)
+        elif induction is not None:
+            self._add_induction_machine(name, bus, plan, induction)
         elif external is not None:
             self.negative.add_to_earth(bus, 1 / external)
             if self.table.external_z0 is None:
@@ -339,6 +344,20 @@ class SequenceAssembly:
             self.zero.add_to_earth(bus, 1 / (1j * base * self.table.machine_x0))
         elif known is None:
             self._assume("machine_x0", name)
+
+    def _add_induction_machine(
+        self, name: str, bus: str, plan: ComponentPlan, own: complex
+    ) -> None:
+        """Add a motor or a generator; what the file has in its place stands for it. Its neutral is not earthed."""
+        known = self.data.machines.get(name)
+        if known is not None and known.negative:
+            own = plan.number("S_n") / SYSTEM_BASE_MVA / known.negative
+            self.read.add("machines")
+        elif plan.description.kind == "load" and bus in self.data.negative:
+            return
+        self.negative.add_to_earth(bus, own)
+        if known is not None and known.zero is not None:
+            self.zero.add_to_earth(bus, plan.number("S_n") / SYSTEM_BASE_MVA / known.zero)
 
     def _assume(self, key: str, name: str) -> None:
         if name not in self.assumed[key]:
