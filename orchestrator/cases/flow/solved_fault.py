@@ -20,7 +20,9 @@ class SolvedFault:
     @property
     def in_words(self) -> str:
         zero = f", Z0 = {_text_of(self.zero)}" if self.kind != "2-phase" else ""
-        met = f"the positive sequence meets {_text_of(self.seen)} pu on 100 MVA"
+        met = "the positive sequence meets an open circuit: no current flows there"
+        if self.seen is not None:
+            met = f"the positive sequence meets {_text_of(self.seen)} pu on 100 MVA"
         when = f"{self.kind} at {self.place}, t = {self.time:g} s"
         return f"{when}: Z2 = {_text_of(self.negative)}{zero} ({self.source}); {met}"
 
@@ -37,4 +39,4 @@ class SolvedFault:
 
 
 def _text_of(z: complex | None) -> str:
-    return "none" if z is None else f"{z.real:.4g}{z.imag:+.4g}j"
+    return "no path" if z is None else f"{z.real:.4g}{z.imag:+.4g}j"

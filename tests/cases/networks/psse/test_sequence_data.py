@@ -229,6 +229,8 @@ def test_no_path_to_earth_means_no_current_and_is_told(prepared):
     assert ready.events[0].settings() == {"bus_2.fault.on": False}
     (text,) = told(ready, "no path of the zero sequence leads to earth from bus_2")
     assert "draws no current there" in text
+    assert "Z0 = no path" in found.in_words
+    assert found.in_words.endswith("meets an open circuit: no current flows there")
     both = prepared(fault='bus = "bus_2"\nkind = "2-phase-earth"').faults[0]
     assert both.seen == both.negative
 
