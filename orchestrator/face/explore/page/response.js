@@ -39,7 +39,7 @@ function setEvents(events) {
   compute();
 }
 // What was asked for and has no curve: a name that is misspelt, or a signal that is not recorded.
-const withoutCurve = found => found.undrawn?.length ? `no curve of ${found.undrawn.join(", ")}: not recorded under this name` : "";
+const withoutCurve = found => found.undrawn?.length ? `no curve of ${found.undrawn.join(", ")}: no recorded signal has this name, or too many were asked for` : "";
 async function linearResponse() {
   const found = await ask("linear response", { ask: "response", ...theCase(), signals: wantedSignals() }, $("run-said"));
   if (!found) { $("run-said").classList.add("bad"); return; }
