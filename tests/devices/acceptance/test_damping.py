@@ -199,3 +199,41 @@ def test_without_a_known_switch_the_remedy_is_a_signal_of_the_binding(gallery):
     (*_, found) = check_fmu(*gallery("converter"), LIMITS, ("pod",), run_for=0.3).results
     assert found.verdict == "not applicable"
     assert '[signals."pod_p.enabled"]' in found.evidence
+
+
+def pod_of(tmp_path, name, **defines):
+    file = build(converter(name, pod=True, **defines), tmp_path)
+    return check_fmu(file, None, LIMITS, ("pod",), run_for=0.3, seed=1).results[-1]
+
+
+def test_a_part_that_a_washout_leaves_for_ever_is_told(tmp_path):
+    """40 % stay: from 2 to 8 s the answer falls to 0.66, as that of a good one may."""
+    found = pod_of(tmp_path, "washed_in_part", POD_WASHES=0.6)
+    assert found.fault == "POD without washout"
+    assert "from 34 to 40 s" in found.evidence
+
+
+def test_a_washout_that_is_slower_than_declared_is_told(tmp_path):
+    """Of 3 s as declared it may keep exp(-6/3), 13.5 %; of 30 s it keeps exp(-6/30), 82 %."""
+    found = pod_of(tmp_path, "slow_washout", POD_SLOWER=10)
+    assert found.fault == "POD washout not as declared"
+    assert "keeps 81.9" in found.evidence
+    assert "13.5 %" in found.evidence
+
+
+def test_a_limit_beyond_any_swing_is_not_held_against_it(tmp_path):
+    """It would take a swing of 0.1 pu, which no device follows."""
+    source = converter("wide", pod=True, POD_MOST=1.0)
+    starts = {"pod_p.limit": 1.0}
+    variables = tuple(replace(v, start=starts.get(v.name, v.start)) for v in source.variables)
+    file = build(replace(source, variables=variables), tmp_path)
+    found = check_fmu(file, None, LIMITS, ("pod",), run_for=0.3, seed=1).results[-1]
+    assert found.verdict == "pass", found.evidence
+    assert "the limit of POD-P, 1 pu, is beyond what it gives in any swing" in found.evidence
+
+
+def test_noise_is_not_called_unstable(tmp_path):
+    noise = "1; power += 0.01 * (fmod(1e4 * m[AGE], 7.0) / 7.0 - 0.4)"
+    found = pod_of(tmp_path, "noisy", FAULT_POD_TIMES=noise)
+    assert found.fault == "POD moves at rest"
+    assert "at rest" in found.evidence

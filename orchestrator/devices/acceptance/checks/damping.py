@@ -20,9 +20,12 @@ from orchestrator.devices.acceptance.checks.damping_memory import (
     DampingFault,
     find_growth,
     find_tiredness,
+    find_unrest,
     find_windup,
 )
 from orchestrator.devices.acceptance.checks.damping_swings import (
+    LATE_LOOKS,
+    LOOKS,
     DampingBench,
     Effect,
     FrequencySwing,
@@ -66,6 +69,13 @@ _WITH = 0.5  # correlation with the frequency from which an output is told to go
 _PUSHED = 3.0  # its duration [s]
 _LIMIT = 0.03  # part of the declared limit by which the output's peak may differ from it
 _HELD = 0.93  # part of its answer to a lasting deviation that a controller without a washout keeps
+_SLOWER = 0.15  # part by which it may keep more than its declared washout lets it
+_STAYS = 0.2  # part of its answer that seems to stay for ever, from which it is watched for longer
+_BENT = 1e-3  # the same by which three looks have to be bent to tell what stays
+_LEFT = 0.1  # part of the usual answer below which nothing is left to judge
+_PART_OF_SWING = (
+    0.75  # a second swing beyond that, in parts of the first: at a limit both bring the same
+)
 _RESTS = 60.0  # time at rest after which it is asked again [s]
 _WAITS = (10.0, _RESTS)  # times at rest after which one that is silent at first is asked again [s]
 _SOON = 2.0  # time after events [s]
@@ -122,6 +132,7 @@ def pod(subject: Subject) -> CheckResult:
     says = f"{' and '.join(bench.titles)}: {tried} comparisons of sizes, directions, points, steps "
     says += f"and times are alike, in a swing of {bench.hertz:.3g} Hz"
     says += f"; {len(trial.passed_over)} points were not tried" if trial.passed_over else ""
+    says += "".join(f"; {limit}, is beyond what it gives in any swing" for limit in trial.unreached)
     figures: dict[str, Any] = {"tried": tried}
     turned = trial.goes_with_frequency()
     if turned:
@@ -139,6 +150,7 @@ class _Trial:
         self._size = 0.0
         self._usual: tuple[Effect, ...] = ()
         self.passed_over: list[OperatingAt] = []
+        self.unreached: list[str] = []  # limits that no swing of a network's frequency reaches
         self.moved_on = False  # whether it came back from no events
 
     def faults(self) -> Iterator[DampingFault | None]:
@@ -147,6 +159,7 @@ class _Trial:
         yield silent
         if silent is not None:
             return
+        yield find_unrest(self._bench, self._usual)
         yield find_growth(self._bench, self._usual, self._size)
         yield self._other_direction()
         yield self._smaller()
@@ -297,11 +310,22 @@ class _Trial:
                 if name == "pod_p":
                     yield self._by_its_cause(self._limit_of_power(number, limit))
                 continue
-            size = self._size * 4.0 * limit / max(usual.peak, 1e-9)
+            wanted = self._size * 4.0 * limit / max(usual.peak, 1e-9)
+            size = min(wanted, self._bench.widest)
             course = self._bench.effects(FrequencySwing(size))[number].course
             peaks = (float(course.max()), float(-course.min()))
             peak = max(peaks, key=lambda peak: abs(peak / limit - 1))
+            if peak < limit and wanted > size and not self._is_flat(number, size):
+                self.unreached.append(f"the limit of {usual.title}, {limit:g} pu")
+                continue
             yield self._by_its_cause(_far_from_limit(usual.title, peak, limit))
+
+    def _is_flat(self, number: int, size: float) -> bool:
+        """Look if a smaller swing brings the same: then something limits the output, and not what it is given."""
+        sizes = (size, _PART_OF_SWING * size)
+        most, less = (self._bench.effects(FrequencySwing(one))[number].course for one in sizes)
+        ends = ((most.max(), less.max()), (most.min(), less.min()))
+        return any(abs(one - other) < _FLAT * abs(one) for one, other in ends)
 
     def _limit_of_power(self, number: int, limit: float) -> DampingFault | None:
         """Judge a limit by the power, where two lasting deviations both reach what limits it."""
@@ -426,18 +450,49 @@ class _Trial:
 
     def _lasting(self) -> Iterator[DampingFault | None]:
         """Hold another frequency: a washout lets go of it."""
-        for title, name, early, late, between in self._bench.lasting(self._size):
-            T_W = self._bench.value_of(f"{name}.T_W")
-            if early < 0.2 * self._usual[self._bench.names.index(name)].peak:
+        for title, name, answers in self._bench.lasting(self._size):
+            if answers[0] < 0.2 * self._usual[self._bench.names.index(name)].peak:
                 yield None
                 continue
-            kept = late / early
-            most = max(_HELD, exp(-between / T_W) + 0.02) if T_W else _HELD
-            if kept > most:
-                says = f"{title} keeps {100 * kept:.3g} % of its answer to a lasting deviation of the frequency "
-                yield DampingFault("POD without washout", f"{says}over {between:.3g} s")
-            else:
-                yield None
+            yield self._keeps(title, name, answers)
+
+    def _keeps(self, title: str, name: str, answers: list[float]) -> DampingFault | None:
+        """Compare the part of its answer that it keeps for some seconds with its washout's."""
+        kept, between = abs(answers[-1]) / answers[0], LOOKS[-1] - LOOKS[0]
+        T_W = self._bench.value_of(f"{name}.T_W")
+        declared = exp(-between / T_W) if T_W else 1.0
+        says = f"{title} keeps {100 * kept:.3g} % of its answer to a lasting deviation of the frequency "
+        says += f"over {between:.3g} s"
+        if kept > max(_HELD, declared + 0.02):
+            return DampingFault("POD without washout", says)
+        stays = self._keeps_for_long(name) if _seems_to_stay(answers) else None
+        if stays is None and kept > declared + _SLOWER:
+            says += f", and {name}.T_W = {T_W:g} s is declared, which lets it keep {100 * declared:.3g} %"
+            return DampingFault("POD washout not as declared", says)
+        return stays
+
+    def _keeps_for_long(self, name: str) -> DampingFault | None:
+        """Watch for longer: a slow washout lets go of it as well, a part without one does not."""
+        if self._bench.time_left(LATE_LOOKS[-1]) < LATE_LOOKS[-1]:
+            return None
+        number, between = self._bench.names.index(name), LATE_LOOKS[-1] - LATE_LOOKS[0]
+        title, _, answers = list(self._bench.lasting(self._size, LATE_LOOKS))[number]
+        T_W = self._bench.value_of(f"{name}.T_W")
+        most = max(_HELD, exp(-between / T_W) + 0.02) if T_W else _HELD
+        if answers[0] < _LEFT * self._usual[number].peak or answers[1] <= most * answers[0]:
+            return None
+        says = f"{title} keeps {100 * answers[1] / answers[0]:.3g} % of its answer to a lasting deviation of the "
+        says += f"frequency from {LATE_LOOKS[0]:g} to {LATE_LOOKS[1]:g} s, {answers[1]:.3g} pu"
+        return DampingFault("POD without washout", says)
+
+
+def _seems_to_stay(answers: list[float]) -> bool:
+    """Continue the exponential through three answers: what it comes to rest at is much of the first."""
+    first, second, third = answers
+    bend = first + third - 2 * second
+    if abs(bend) < _BENT * first:
+        return True
+    return (first * third - second**2) / bend > _STAYS * first
 
 
 def _far_from_limit(title: str, peak: float, limit: float) -> DampingFault | None:

@@ -19,6 +19,7 @@ _LATE = (13.0, 18.0)  # … with that in this one
 _GROWS = 1.05  # later answer in parts of the earlier one from which it grows
 _SWINGS_ON = 0.97  # the same of what swings about its mean, which an honest one damps
 _BEYOND = 1.2  # later answer in parts of that to the swing itself, which no calm one has
+_UNREST = 0.05  # movement at rest, in parts of the answer to a swing, that is no rounding
 _LEFT = 0.02  # part of its answer to the swing below which nothing is left to judge
 _SHORT = 0.6  # duration of a deviation that holds it at its limit [s]
 _LONG = 3.0  # of a longer one
@@ -58,6 +59,16 @@ def find_growth(bench: DampingBench, usual: tuple[Effect, ...], size: float) -> 
             says = f"{effect.title} gives {after:.3g} pu {_LATE[0]:g} to {_LATE[1]:g} s after a swing, and "
             says += f"{before:.3g} pu {_EARLY[0]:g} to {_EARLY[1]:g} s after it, at rest"
             return DampingFault("POD unstable", says)
+    return None
+
+
+def find_unrest(bench: DampingBench, usual: tuple[Effect, ...]) -> DampingFault | None:
+    """Look at a run without a swing: noise moves an output there as it does in a swing."""
+    for effect, course in zip(usual, bench.courses(FrequencySwing(0.0)), strict=True):
+        moves = float(np.ptp(bench.part(course, 0.5 * bench.lasts, bench.lasts)))
+        if moves > _UNREST * effect.peak:
+            says = f"{effect.title} moves by {moves:.3g} pu at rest, and gives {effect.peak:.3g} pu in a swing"
+            return DampingFault("POD moves at rest", says)
     return None
 
 

@@ -15,11 +15,11 @@ from orchestrator.devices.fmi.port import BoundDescription
 _BASE = 100 * pi  # angular frequency [rad/s] by which an angle turns with 1 pu of deviation
 _HERTZ = (0.7, 1.3)  # bounds of the swing's frequency [Hz], that of oscillations between areas
 _SWINGS = 1.6  # duration of a swing [s]
-LASTING = 8.0  # duration of a lasting deviation [s]
+LOOKS = (2.0, 5.0, 8.0)  # times [s] at which the answer to a lasting deviation is compared
+LATE_LOOKS = (34.0, 40.0)  # the same where something seems to stay
 _PLATEAU = 0.5  # time [s] over which the power is averaged where an output stays at its limit
 _RESTED = 3.0  # time at rest after strong swings [s]
-_WIDEST = 0.01  # largest lasting deviation of the frequency [pu]
-_LOOKS = (2.0, 8.0)  # times [s] at which the answer to it is compared
+_WIDEST = 0.01  # largest deviation of the frequency [pu] that every device follows
 _MEAN = 0.1  # time [s] over which that is averaged
 _BEFORE = 0.1  # time at rest before events [s]
 _EVENT = 0.1  # duration of an event [s]
@@ -309,15 +309,18 @@ class DampingBench:
             found.append(float(np.abs(sums[mean:] - sums[:-mean]).max()) / mean)
         return found
 
-    def lasting(self, size: float) -> Iterator[tuple[str, str, float, float, float]]:
-        """Title, name, answers early and late [pu, S_n] to a lasting deviation, and the time between them [s]."""
-        swing = FrequencySwing(0.5 * size, lasting=LASTING)
+    def lasting(
+        self, size: float, looks: tuple[float, ...] = LOOKS
+    ) -> Iterator[tuple[str, str, list[float]]]:
+        """Title, name, and answers [pu, S_n] at some times to a lasting deviation; the first is positive."""
+        swing = FrequencySwing(0.5 * size, lasting=looks[-1])
         h = self.subject.step_size
         mean = max(1, round(_MEAN / h))
         for name, effect in zip(self.names, self.effects(swing), strict=True):
-            ends = [min(len(effect.course), round(look / h)) for look in _LOOKS]
-            early, late = (abs(float(effect.course[end - mean : end].mean())) for end in ends)
-            yield effect.title, name, early, late, _LOOKS[1] - _LOOKS[0]
+            ends = [min(len(effect.course), round(look / h)) for look in looks]
+            answers = [float(effect.course[end - mean : end].mean()) for end in ends]
+            side = -1.0 if answers[0] < 0 else 1.0
+            yield effect.title, name, [side * answer for answer in answers]
 
 
 def _part(change: Numbers, name: str) -> Numbers:

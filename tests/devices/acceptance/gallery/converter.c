@@ -68,6 +68,12 @@ enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, TICK, PENDING, ON, 
 #ifndef POD_SHOWN
 #define POD_SHOWN POD_UNIT
 #endif
+#ifndef POD_SLOWER
+#define POD_SLOWER 1.0 /* its washout's time constant in parts of the declared one */
+#endif
+#ifndef POD_WASHES
+#define POD_WASHES 1.0 /* part of a lasting deviation that its washout takes out */
+#endif
 #ifndef POD_MOST
 #define POD_MOST 0.1 /* the limit as declared, in that unit */
 #endif
@@ -394,9 +400,9 @@ static void substep(const double *z, double *m, double *hidden, phasor v, double
 #ifdef POD
     const double w = slip(z, m, m[P_F]);
 #ifndef FAULT_POD_WITHOUT_WASHOUT
-    m[WASHED] += h / z[POD_T_W] * (w - m[WASHED]);
+    m[WASHED] += h / (z[POD_T_W] * POD_SLOWER) * (w - m[WASHED]);
 #endif
-    m[PASSED] += h / z[POD_T_F] * (w - m[WASHED] - m[PASSED]);
+    m[PASSED] += h / z[POD_T_F] * (w - POD_WASHES * m[WASHED] - m[PASSED]);
     m[AGE] += h;
     m[USED] += h * fabs(damping_power(z, m));
 #ifdef POD_INTEGRAL /* gain of its integral part [1/s]; POD_LEAK: time in which that forgets [s] */
