@@ -237,3 +237,10 @@ def test_noise_is_not_called_unstable(tmp_path):
     found = pod_of(tmp_path, "noisy", FAULT_POD_TIMES=noise)
     assert found.fault == "POD moves at rest"
     assert "at rest" in found.evidence
+
+
+def test_a_sampled_controller_is_good_and_its_time_is_told(tmp_path):
+    """An output in stairs of 10 ms is not one that follows the communication step."""
+    found = pod_of(tmp_path, "sampled", POD_SAMPLES=0.01)
+    assert found.verdict == "remark", found.evidence
+    assert "the output of POD-P moves once in 10" in found.evidence

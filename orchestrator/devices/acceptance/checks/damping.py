@@ -106,6 +106,9 @@ _ASK_FOR_ITS_SIGN = (
 )
 
 
+_ASK_FOR_ITS_SAMPLING = "ask for its sample time: half of it is a delay that studies have to hold"
+
+
 @check(
     "pod",
     "Does its damping controller work for every size, direction, point, step and time?",
@@ -134,6 +137,9 @@ def pod(subject: Subject) -> CheckResult:
     says += f"; {len(trial.passed_over)} points were not tried" if trial.passed_over else ""
     says += "".join(f"; {limit}, is beyond what it gives in any swing" for limit in trial.unreached)
     figures: dict[str, Any] = {"tried": tried}
+    sampled = trial.is_sampled()
+    if sampled:
+        return remarked("pod", f"{says}; {sampled}", _ASK_FOR_ITS_SAMPLING, **figures)
     turned = trial.goes_with_frequency()
     if turned:
         return remarked("pod", f"{says}; {turned}", _ASK_FOR_ITS_SIGN, **figures)
@@ -174,6 +180,14 @@ class _Trial:
         yield find_windup(self._bench, self._usual, self._size)
         yield self._after_work(_DAMAGED)
         yield from self._lasting()
+
+    def is_sampled(self) -> str:
+        """Say which output stands still for most of the steps; "" if none does."""
+        slow = [one for one in self._usual if one.sample_time]
+        return "; ".join(
+            f"the output of {one.title} moves once in {1e3 * one.sample_time:.3g} ms"
+            for one in slow
+        )
 
     def goes_with_frequency(self) -> str:
         """Say that POD-P asks for more power while the frequency is higher; "" if it does not."""
@@ -388,6 +402,7 @@ class _Trial:
                 found,
                 "POD follows the step",
                 f"at {words} the communication step of {h:g} s",
+                within=max(1.0, times) * h,
             )
 
     def _later_start(self) -> DampingFault | None:
@@ -504,10 +519,14 @@ def _far_from_limit(title: str, peak: float, limit: float) -> DampingFault | Non
 
 
 def _compare(
-    usual: tuple[Effect, ...], found: tuple[Effect, ...], fault: str, where: str
+    usual: tuple[Effect, ...],
+    found: tuple[Effect, ...],
+    fault: str,
+    where: str,
+    within: float = 0.0,
 ) -> DampingFault | None:
     for one, other in zip(usual, found, strict=True):
-        apart = one.apart(other)
+        apart = one.apart(other, within)
         if apart > _SAME_TIME:
             return DampingFault(
                 fault, f"{one.title} answers by {100 * apart:.3g} % otherwise {where}"

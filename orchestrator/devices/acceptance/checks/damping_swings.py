@@ -97,9 +97,24 @@ class Effect:
         for mine, its in ((self.course, other.course), (self.power, other.power)):
             yield mine / self.size, np.interp(self.time, other.time, its) / other.size
 
-    def apart(self, other: "Effect") -> float:
-        """The largest difference of both in parts of this one's answer."""
-        return max(float(np.abs(a - b).max() / np.abs(a).max()) for a, b in self.pairs(other))
+    def apart(self, other: "Effect", within: float = 0.0) -> float:
+        """The largest difference in parts of this one's answer; values may come `within` [s] sooner or later."""
+        found = []
+        for course, its in ((self.course, other.course), (self.power, other.power)):
+            shifts = (-within, 0.0, within)
+            moved = np.array([np.interp(self.time + shift, other.time, its) for shift in shifts])
+            mine, moved = course / self.size, moved / other.size
+            away = np.maximum(mine - moved.max(axis=0), moved.min(axis=0) - mine)
+            found.append(float(np.maximum(away, 0.0).max() / np.abs(mine).max()))
+        return max(found)
+
+    @property
+    def sample_time(self) -> float:
+        """Time [s] between two movements of an output that moves in less than half of the steps, else 0."""
+        moves = np.flatnonzero(np.diff(self.course))
+        if not self.shown or len(moves) < 2 or len(moves) > 0.5 * len(self.course):
+            return 0.0
+        return float(np.median(np.diff(self.time[moves])))
 
 
 def likeness(usual: Effect, other: Effect) -> float:
