@@ -1,5 +1,5 @@
-"""Admittances of induction machines to the negative sequence: their circuit at the slip 2 − s, the rotor turning
-against that sequence's field, and the susceptance beside them.
+"""Induction machines in faults: in the negative sequence their circuit at the slip 2 − s, as the rotor turns against
+that sequence's field, with the susceptance beside them; in a short circuit of three phases at standstill.
 
 Source: P. C. Krause, "Analysis of Electric Machinery" (1986), chapter 4."""
 
@@ -13,6 +13,7 @@ _BY_CAGES = ("RA", "XA", "XM", "R1", "X1", "R2", "X2", "IT")
 _BY_REACTANCES = ("RA", "X", "Xp", "Xpp", "Xl", "Tp", "Tpp", "f_n")
 _NESTED = 2  # IT of a second cage behind the first's reactance
 _AGAINST = 2.0  # slip of a rotor at synchronous speed against the field of the negative sequence
+_STANDSTILL = 1.0  # slip
 _ITERATIONS = 30  # of the slip; near the pull-out point each halves the distance
 _STEP = 1e-6  # of the slip, for the slope of the power
 
@@ -59,6 +60,14 @@ def negative_admittance(plan: ComponentPlan, drawn: complex, voltage: float) -> 
     own = circuit.admittance(_AGAINST - slip)
     beside = 1j * (reactive - drawn.imag) / square
     return plan.number("S_n") / SYSTEM_BASE_MVA * (own + beside)
+
+
+def locked_impedance(plan: ComponentPlan) -> complex | None:
+    """Return the impedance of an induction machine at standstill [pu, 100 MVA]; None for anything else."""
+    circuit = _circuit_of(plan)
+    if circuit is None:
+        return None
+    return SYSTEM_BASE_MVA / plan.number("S_n") / circuit.admittance(_STANDSTILL)
 
 
 def _circuit_of(plan: ComponentPlan) -> _Circuit | None:

@@ -2,8 +2,9 @@
 
 The convention: an initial three-phase short circuit from 1 pu everywhere (c = 1). Machines are R_s + jX''_d (jX'_d of
 the classical one) with their own transformer, external grids their impedance, lines and transformers have their ratio.
-Loads, shunts and charging are left out. A converter feeds a declared current, by default none, which adds to the
-others' without regard to its angle, as converters do in IEC 60909-0:2016."""
+Induction generators are their circuit at standstill, as in IEC 60909-0:2016. Loads, motors among them, shunts and
+charging are left out. A converter feeds a declared current, by default none, which adds to the others' without regard
+to its angle, as converters do in that standard."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,6 +15,7 @@ import numpy as np
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.flow.balance import FlowLine
+from orchestrator.cases.flow.induction_impedances import locked_impedance
 from orchestrator.cases.flow.source_impedances import source_impedance
 from orchestrator.cases.form.names import close_names
 from orchestrator.cases.scenario.prepare import PreparedScenario
@@ -22,7 +24,7 @@ from orchestrator.core.errors import InputError, few
 
 CONVENTION = (
     "initial three-phase short circuit from 1 pu (c = 1); machines as R_s + jX''d with their transformer, external "
-    "grids as their impedance; loads, shunts and charging left out; converters feed {:g} pu of their rating"
+    "grids as their impedance; loads with motors, shunts and charging left out; converters feed {:g} pu of their rating"
 )
 _FARTHEST = 1e5  # largest factor on the impedances at a bus, and the inverse of the smallest
 
@@ -89,7 +91,9 @@ class ShortCircuit:
                 and is_connected(plans[prepared.grid], f"{port.name}.connected")
             ):
                 continue
-            z = source_impedance(plan)
+            if plan.description.kind == "load":
+                continue
+            z = source_impedance(plan) or locked_impedance(plan)
             if z is None:
                 converters[port.name] = port.bus, plan.number("S_n")
             else:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from orchestrator.cases.case import load_case
+from orchestrator.cases.scenario.short_circuit import ShortCircuit
 
 GRID = """\
 name = "one_line"
@@ -45,11 +46,15 @@ OMEGA_B = 2 * np.pi * 60
 STATOR, X_M, FIRST, SECOND = 0.02 + 0.1j, 3.0, (0.03, 0.12), (0.01, 0.3)
 
 
-def _negative_impedance(tmp_path, name, machine):
-    """Return Z2 at b2 [pu, 100 MVA], and the voltage there before the fault [pu]."""
+def _prepared(tmp_path, name, machine):
     path = tmp_path / f"{name}.toml"
     path.write_text(GRID.format(machine=machine), encoding="utf-8")
-    (ready,) = load_case(path).prepare()
+    return load_case(path).prepare()[0]
+
+
+def _negative_impedance(tmp_path, name, machine):
+    """Return Z2 at b2 [pu, 100 MVA], and the voltage there before the fault [pu]."""
+    ready = _prepared(tmp_path, name, machine)
     return ready.faults[0].seen, abs(ready.power_flow.voltages["b2"])
 
 
@@ -112,3 +117,21 @@ def test_a_machine_is_its_circuit_at_the_slip_two_less_its_own(machine, second, 
     alone, _ = _negative_impedance(tmp_path, "alone", "")
     with_it, voltage = _negative_impedance(tmp_path, "with_it", machine)
     assert 1 / with_it - 1 / alone == pytest.approx(_expected(voltage, second, nested), rel=2e-4)
+
+
+def test_in_a_short_circuit_a_motor_is_a_load_and_a_generator_stands_still(tmp_path):
+    """Neither is a converter, which would have a short-circuit ratio."""
+    names = {"alone": "", "motor": _motor(), "generator": _generator()}
+    circuits = {
+        name: ShortCircuit.of(_prepared(tmp_path, name, text)) for name, text in names.items()
+    }
+    assert [circuit.gscr() for circuit in circuits.values()] == [None, None, None]
+    at = {
+        name: next(bus for bus in circuit.strengths() if bus.bus == "b2")
+        for name, circuit in circuits.items()
+    }
+    assert at["motor"] == at["alone"]
+    alone = at["alone"]
+    y = alone.s_sc_mva / 100 / np.exp(1j * np.arctan(alone.x_r))
+    expected = abs(y + RATING / 100 * _admittance(1.0, False, False)) * 100
+    assert at["generator"].s_sc_mva == pytest.approx(expected, rel=1e-6)
