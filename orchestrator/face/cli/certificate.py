@@ -90,7 +90,10 @@ def _verdicts(found: Certificate) -> PlainTable:
         left=99,
     )
     judged = [v for v in found.verdicts if v.judged]
-    bad, unknown = [v for v in judged if not v.accepted], [v for v in found.verdicts if v.unknown]
+    bad, unknown = (
+        [v for v in judged if not v.accepted],
+        [v for v in found.verdicts if v.not_judged],
+    )
     counted = [
         f"{len(judged)} judged",
         f"{len(bad)} failed",
@@ -105,7 +108,7 @@ def _verdicts(found: Certificate) -> PlainTable:
         word = word if v.judged else NO_VERDICT
         word = NOT_JUDGED if v in unknown else word
         failed = "; ".join(f"{f.criterion}: {f.text}" for f in v.failed)
-        remark = v.unknown or failed or (f"nearest: {least.criterion}" if least else "")
+        remark = v.not_judged or failed or (f"nearest: {least.criterion}" if least else "")
         margin = "–" if least is None else margin_of(least)
         met = f"{sum(f.accepted is True for f in known)} of {len(v.findings)}"
         table.add_row(v.row.name, word, met, margin, short(remark, _LONGEST))

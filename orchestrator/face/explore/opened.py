@@ -78,6 +78,7 @@ def _rows(certificate: Certificate) -> Iterator[tuple[str, str, dict[str, Any]]]
         pictures: list[tuple[str, list[ChartCurve], str]] = []
         if isinstance(certificate, DampingCertificate):
             name, bench, said = f"X_L = {verdict.X_L:g} pu", CASE, list(verdict.faults)
+            unknown = verdict.unknown
             said += [
                 f"{m.criterion}: {m.text} (margin {margin_text(m.margin)})"
                 for m in verdict.margins()
@@ -95,7 +96,8 @@ def _rows(certificate: Certificate) -> Iterator[tuple[str, str, dict[str, Any]]]
             ]
             drawn = pictures_of(verdict, certificate.results[name], certificate.f_n)
             pictures = [(label, curves, caption) for _, label, curves, caption in drawn]
-        said += [f"not judged: {verdict.unknown}"] if verdict.unknown else []
+            unknown = verdict.not_judged
+        said += [f"not judged: {unknown}"] if unknown else []
         yield (
             name,
             bench,

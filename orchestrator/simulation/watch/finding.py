@@ -17,6 +17,7 @@ Kind = Literal[
     "failure",
     "misfit",
     "trip",
+    "bench_resonance",
 ]
 
 UNSTABLE: frozenset[Kind] = frozenset(
@@ -39,6 +40,9 @@ NOT_JUDGED: Kind = "not_judged"
 
 TRIP: Kind = "trip"
 """Kind of finding of a relay that acted; what it does to the system, the others tell."""
+
+# of a test bench whose own capacitance makes the oscillation: the response tells nothing of the device in a grid
+BENCH_RESONANCE: Kind = "bench_resonance"
 
 
 @dataclass(frozen=True, slots=True)

@@ -255,7 +255,7 @@ def _row_lines(c: Certificate) -> str:
     rows = []
     for verdict in c.verdicts:
         failed = verdict.failed
-        why = [f"{one.criterion}: {one.text}" for one in failed[:1]] or [verdict.unknown]
+        why = [f"{one.criterion}: {one.text}" for one in failed[:1]] or [verdict.not_judged]
         more = f" (and {', '.join(one.criterion for one in failed[1:])})" if failed[1:] else ""
         word = {True: "accepted", False: "NOT accepted", None: "not judged"}[verdict.accepted]
         shade = SHADES[verdict.accepted]

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -11,6 +11,7 @@ import tomli_w
 
 from orchestrator.cases.case import Case
 from orchestrator.cases.form.schema import Value
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import ComponentError, CosimError, ErrorKind
 from orchestrator.core.safe_files import write_text
@@ -18,8 +19,11 @@ from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.port import BoundDescription
 from orchestrator.linear.models.device_start import misfits_of
+from orchestrator.simulation.watch.finding import UNSTABLE, Finding
 from orchestrator.simulation.watch.watch import Watch
 from orchestrator.studies.certification.case_file import BINDING, FMU
+from orchestrator.studies.certification.codes.bench_resonance import find_resonance
+from orchestrator.studies.certification.codes.measured import RESONANCE
 from orchestrator.studies.certification.codes.programme import RATING_MVA, BenchProgramme
 from orchestrator.studies.certification.request import CertificationRequest
 from orchestrator.studies.modes.modes import running
@@ -203,9 +207,30 @@ def row_result(task: BenchTask, case: Case) -> BenchResult:
                 # the converter gave up, or its values were no numbers: the row is not met
                 ended = error
         _keep(result, watch)
-        result.findings = [finding.as_json() for finding in watch.findings(ended, misfits=misfits)]
+        found = watch.findings(ended, misfits=misfits)
+        high = bool((result.signals["v"] > RESONANCE).any())
+        if high or ended is not None or any(finding.kind in UNSTABLE for finding in found):
+            found += _resonance(task, case, result, prepared)
+        result.findings = [finding.as_json() for finding in found]
         result.seconds = _processor_time() - begin
     return result
+
+
+def _resonance(
+    task: BenchTask, case: Case, result: BenchResult, prepared: PreparedScenario
+) -> list[Finding]:
+    """The finding on the bench's own resonance, from runs with parts of its capacitance and step."""
+
+    def prepare(capacitance: float, step: float) -> PreparedScenario:
+        study = replace(task.study, step_size=step * prepared.step_size)
+        values = {**dict(task.changes), f"{BENCH}.B": capacitance * CAPACITANCE}
+        return study.prepare(case, values)
+
+    v = result.signals["v_re"] + 1j * result.signals["v_im"]
+    names = [f"{BENCH}.{name}" for name in ("v_re", "v_im", "p", "q")]
+    f_n = float(prepared.system.components[BENCH].value("f_n") or 0.0)
+    found = find_resonance(prepare, result.times, v, names, f_n)
+    return [] if found is None else [found]
 
 
 def _processor_time() -> float:

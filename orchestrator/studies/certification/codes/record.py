@@ -95,12 +95,12 @@ def row_chapters(c: Certificate, figures: Figures) -> list[tuple[str, str]]:
             "",
             "",
             "",
-            escape(v.unknown),
+            escape(v.not_judged),
             "–",
             NOT_JUDGED,
         ]
         for v in c.verdicts
-        if v.unknown
+        if v.not_judged
     ]
     columns = [
         "Row",
@@ -128,6 +128,7 @@ def _pictures(c: Certificate, figures: Figures) -> str:
         content = row_pictures(v, c.results[v.row.name], c.f_n, figures)
         if content:
             refusal = NO_VERDICT if v.row.shown_only else "not accepted"
+            refusal = NOT_JUDGED if v.not_judged else refusal
             word = "accepted" if v.accepted else refusal
             title = escape(f"{v.row.name}: {v.row.title}: {word}")
             parts.append(

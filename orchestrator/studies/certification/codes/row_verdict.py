@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.core.errors import InputError
+from orchestrator.simulation.watch.finding import BENCH_RESONANCE
 from orchestrator.studies.certification.codes.bench_point import INTERVAL, RECORDED, BenchResult
 from orchestrator.studies.certification.codes.criteria import CURRENT, carries, holds_together
 from orchestrator.studies.certification.codes.measured import MeasuredRow
@@ -20,11 +21,15 @@ NOT_JUDGED = "not judged"  # the response allows none
 
 @dataclass(frozen=True)
 class RowVerdict:
-    """A row with a finding for each criterion; ``unknown``: why nothing is known of it, as the run failed."""
+    """A row with a finding for each criterion.
+
+    ``unknown``: why nothing is known of it, as the run failed; ``of_the_bench``: why its response, which is known, says
+    nothing of the converter, as the bench itself makes what fails there."""
 
     row: CodeRow
     findings: tuple[RowFinding, ...] = ()
     unknown: str = ""
+    of_the_bench: str = ""
 
     @property
     def name(self) -> str:
@@ -32,7 +37,12 @@ class RowVerdict:
 
     @property
     def judged(self) -> bool:
-        return not self.unknown and not self.row.shown_only
+        return not self.not_judged and not self.row.shown_only
+
+    @property
+    def not_judged(self) -> str:
+        """Return why the row has no verdict; empty where it has one."""
+        return self.unknown or self.of_the_bench
 
     @property
     def accepted(self) -> bool | None:
@@ -113,7 +123,22 @@ def judge_row(
                 found.append(holds_together()(measured))
     if row.shown_only:
         return RowVerdict(row, tuple(replace(finding, accepted=None) for finding in found))
+    resonance = next((f for f in result.findings if f["kind"] == BENCH_RESONANCE), None)
+    if resonance is not None and not all(finding.accepted for finding in found):
+        return _left_open(row, found, str(resonance["message"]))
     return RowVerdict(row, tuple(found))
+
+
+def _left_open(row: CodeRow, found: Sequence[RowFinding], why: str) -> RowVerdict:
+    """A row whose response the bench makes: its figures are shown, and none is a verdict on the converter."""
+    told = f"{NOT_JUDGED}, the bench's own capacitance makes the response"
+    shown = [
+        f
+        if f.accepted is None
+        else replace(f, accepted=None, margin=None, text=f"{f.text}; {told}")
+        for f in found
+    ]
+    return RowVerdict(row, tuple(shown), of_the_bench=why)
 
 
 def _ended_early(result: BenchResult, measured: MeasuredRow, stop: float) -> RowFinding:

@@ -12,7 +12,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.core.errors import ErrorKind, InputError
 from orchestrator.core.late import xr
 from orchestrator.devices.binding.binding import bound_fmu
-from orchestrator.simulation.watch.finding import UNSTABLE
+from orchestrator.simulation.watch.finding import BENCH_RESONANCE, UNSTABLE
 from orchestrator.studies.certification.case_file import lay_files
 from orchestrator.studies.certification.certificate import Certificate
 from orchestrator.studies.certification.codes.bench_point import (
@@ -202,7 +202,7 @@ def _fault_of_row(
         return f"it cannot be computed again: {again.failure}"
     stated = next(entry for entry in content["rows"] if entry["row"] == row.name)
     kinds = [
-        sorted({f["kind"] for f in findings} & UNSTABLE)
+        sorted({f["kind"] for f in findings} & {*UNSTABLE, BENCH_RESONANCE})
         for findings in (stated["findings"], again.findings)
     ]
     if kinds[0] != kinds[1]:

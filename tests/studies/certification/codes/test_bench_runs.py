@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 import orchestrator as gfor
+from orchestrator.simulation.watch.finding import BENCH_RESONANCE
 from orchestrator.studies.certification.codes import bench_point
 from orchestrator.studies.certification.codes.all_codes import CODES, ERCOT
 from orchestrator.studies.certification.codes.bench_point import case_name
@@ -17,6 +18,8 @@ from orchestrator.studies.certification.kinds import ROWS
 from orchestrator.studies.certification.request import CertificationRequest
 from orchestrator.studies.certification.verification import read_certificate, verify_files
 from orchestrator.studies.points.executor import Serial
+from tests.devices.acceptance.gallery.build import build
+from tests.devices.acceptance.gallery.members import device
 from tests.support.grid_codes import replace_code
 
 pytestmark = pytest.mark.slow
@@ -122,6 +125,37 @@ def test_a_row_of_another_converter_is_seen_when_it_is_computed_anew(
     code, said, _ = gfor_command("verify", folders[1], "--workers", 1)
     assert code == 5
     assert "row phase_jumps: v_re: it differs by up to" in said
+
+
+def test_an_honest_device_that_feeds_the_bench_s_resonance_is_not_failed(
+    tmp_path, one_row, gfor_command
+):
+    """Matching control, whose current lags by 3 ms, and whose verdict nobody can change by leaving the finding out."""
+    fmu = build(device("matching", "MATCHING"), tmp_path)
+    found = certify_code(CertificationRequest(fmu), one_row, Serial(), tmp_path / "out")
+    (verdict,) = found.verdicts
+    assert (found.verdict, verdict.judged, verdict.failed) == ("incomplete", False, [])
+    (finding,) = (f for f in found.results["phase_jumps"].findings if f["kind"] == BENCH_RESONANCE)
+    first, half, quarter = (
+        finding[name] for name in ("frequency_hz", "frequency_at_0.5", "frequency_at_0.25")
+    )
+    row = one_row.rows[0].programme(found.f_n)
+    reactance = row.impedance.imag * bench_point.CAPACITANCE
+    assert first == pytest.approx(found.f_n / reactance**0.5, rel=0.25)
+    assert [half, quarter] == pytest.approx([first * 2**0.5, 2 * first], rel=0.02)
+    assert "row phase_jumps" in found.missing
+    save(found, tmp_path / "out")
+    folder, content = read_certificate(tmp_path / "out")
+    assert verify_files(folder, content).holds
+    code, said, _ = gfor_command("verify", tmp_path / "out", "--workers", 1)
+    assert code == 3
+    assert "row phase_jumps, computed anew: its response to t = " in said
+    other = deepcopy(content)
+    kept = [f for f in other["rows"][0]["findings"] if f["kind"] != BENCH_RESONANCE]
+    other["rows"][0]["findings"] = kept
+    (fault,) = ROWS.verify(folder, other, ["phase_jumps"], Serial()).faults
+    assert "bench resonance" in fault
+    assert not verify_files(folder, other).holds
 
 
 def test_rows_are_drawn_by_their_margin_and_by_chance():

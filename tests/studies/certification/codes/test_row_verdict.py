@@ -47,6 +47,36 @@ def test_beside_a_slip_nothing_reads_as_accepted(kind):
     assert verdict.word(others[0]) == "not judged"
 
 
+def resonant(p):
+    """A row with a slip that the bench's own resonance makes."""
+    row = next(row for row in CODES["aemo"].rows if row.name == "jump_30")
+    kinds = ("loss_of_synchronism", "bench_resonance")
+    findings = [{"kind": kind, "time": 1.3, "message": f"{kind} is found"} for kind in kinds]
+    signals = {"p": p, "q": np.full(TIMES.shape, 0.1), "v": np.ones(TIMES.shape)}
+    return judge_row(row, BenchResult(row.name, TIMES, signals, findings), 50.0)
+
+
+def test_what_the_bench_s_own_resonance_makes_is_no_verdict_on_the_converter():
+    """Also what it misses beside the slip, which stays missed where the slip is the device's own."""
+    verdict = resonant(np.full(TIMES.shape, 0.5))
+    assert (verdict.judged, verdict.accepted, verdict.failed) == (False, None, [])
+    assert verdict.not_judged == "bench_resonance is found"
+    assert {(f.accepted, f.margin) for f in verdict.findings} == {(None, None)}
+    assert verdict.findings[0].text.startswith(
+        "loss_of_synchronism is found; not judged, the bench"
+    )
+    assert {verdict.word(f) for f in verdict.findings} == {"not judged"}
+    assert verdict.margins() == []
+
+
+def test_a_row_that_is_met_beside_the_bench_s_resonance_stays_met():
+    row = next(row for row in CODES["aemo"].rows if row.name == "jump_30")
+    findings = [{"kind": "bench_resonance", "time": 1.3, "message": "found"}]
+    signals = {"p": opposing(), "q": np.full(TIMES.shape, 0.1), "v": np.ones(TIMES.shape)}
+    verdict = judge_row(row, BenchResult(row.name, TIMES, signals, findings), 50.0)
+    assert (verdict.judged, verdict.accepted, verdict.not_judged) == (True, True, "")
+
+
 def test_beside_values_that_are_no_numbers_nothing_reads_as_accepted():
     """The last value alone: no criterion looks at it."""
     verdict = judged(np.where(TIMES > 20.9995, np.nan, opposing()))
