@@ -177,7 +177,7 @@ def _read_line(path: Path, number: int, words: list[str]) -> AllowedSigner:
 
 def _read_options(place: str, text: str) -> Iterator[tuple[str, str]]:
     known = ("cert-authority", "namespaces", "valid-after", "valid-before")
-    end = 0
+    end, seen = 0, set[str]()
     while end < len(text):
         option = _OPTION.match(text, end)
         name = option["name"].lower() if option else ""
@@ -185,6 +185,9 @@ def _read_options(place: str, text: str) -> Iterator[tuple[str, str]]:
             raise InputError(
                 place + f": {text[end:]!r} is no option; there are: {', '.join(known)}"
             )
+        if name in seen:  # OpenSSH refuses it too: whichever holds, the other is a mistake
+            raise InputError(place + f": {name} stands there twice; leave one of them")
+        seen.add(name)
         yield name, (option["value"] or "").strip('"')
         end = option.end()
 

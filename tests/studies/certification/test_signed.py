@@ -596,6 +596,7 @@ def test_what_does_not_hold_or_was_changed_is_not_signed(certificate, keys, gfor
         ("lab@example.org ssh-ed25519 AAAA", "no public key"),
         ("lab@example.org", "it has no public key"),
         ("lab@example.org colour=red {key}", "is no option"),
+        ('lab@example.org namespaces="file",namespaces="git" {key}', "stands there twice"),
         ("lab@example.org valid-before=soon {key}", "is no time"),
         ("# nobody", "it names nobody"),
     ],
