@@ -25,6 +25,7 @@ from fmus.vendor_dll.state_trial import Trial
 
 _LIBRARIES = {"linux64": ("dl",), "win64": (), "darwin64": ()}
 _LONGEST = 60  # time for a DLL to tell what it is, or for the trial, from when it is loaded [s]
+_MOST_READINGS = 8  # of a DLL; each file that it names may make it name another, and in practice two are enough
 
 _FORMATS = (
     (b"\x7fELF\x02", "linux64", "a library for 64-bit Linux"),
@@ -82,7 +83,7 @@ def read_dll(
         {name: value for name, value in (texts or {}).items() if isinstance(value, str)},
         dict[str, Path](),
     )
-    while True:
+    for _ in range(_MOST_READINGS):
         asked = ask(
             path,
             reader,
@@ -109,6 +110,11 @@ def read_dll(
         if named == files:
             break
         files = named  # known from what it declares; now it is run with them
+    else:
+        raise DllError(
+            f"{path.name}: the files that its text parameters name are others in each of {_MOST_READINGS} readings; "
+            "its author must mend that"
+        )
     if asked.in_its_start and (unseen := unseen_files(interface, given, files)):
         raise DllError(f"{path.name}: the process that runs it {asked.end}; {unseen}")
     return VendorDll(

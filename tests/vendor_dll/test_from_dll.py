@@ -1,5 +1,6 @@
 """A vendor's IEEE/CIGRE DLL as an FMU: what it computes, what it says, where its state is, and planted faults."""
 
+import itertools
 import sys
 
 import numpy as np
@@ -387,6 +388,19 @@ def test_a_dll_that_hangs_is_given_up(tmp_path, monkeypatch):
     library = compiled(lag(head=LOOP), tmp_path)
     with pytest.raises(DllError, match="does not end within 3 s"):
         read_dll(library)
+
+
+def test_a_dll_that_names_another_file_at_each_reading_is_given_up(tmp_path, monkeypatch):
+    files = itertools.count()
+
+    def another(*_):
+        path = tmp_path / f"table_{next(files)}.txt"
+        path.touch()
+        return {"table": path}
+
+    monkeypatch.setattr(dll_module, "places", another)
+    with pytest.raises(DllError, match="are others in each of 8 readings"):
+        read_dll(compiled(lag(), tmp_path))
 
 
 def test_a_dll_that_crashes_with_moving_inputs_is_still_described(described, tmp_path):
