@@ -93,6 +93,11 @@ def event_of(option: Option, text: str) -> EventInWords:
         along = _ALONG.fullmatch(given.get("bus", ""))
         if along is not None:
             kind, name, given = LineFaultTable, "line_fault", _along_a_line(given, along)
+        elif given.get("cleared_by") in _OPENED:
+            raise ValueError(
+                f"opens {given['cleared_by']!r}: at a bus it names the line, as in 'opens line_7_9'; "
+                "'it' and 'one pole' are of a fault along a line, as in 'line_7_9 at 30 %'"
+            )
         table: EventInWords = kind(type=name, time=time, **given)
         return table.asked_as(option + f" {text!r}")
     except ValueError as error:  # pydantic's and ours

@@ -34,7 +34,7 @@ _ASSUMED = {
     "groups": "the vector group of three windings is taken as YNynd",
     "machine_x2": f"X2 is taken as {usual.MACHINE_X2:g} times X''d",
     "machine_x0": "the neutral is taken as not earthed",
-    "converter_x2": "taken to feed the positive sequence alone, as a source of current to the negative one",
+    "converter_x2": "it is taken to feed the positive sequence alone, as a source of current",
     "external_z0": f"the zero-sequence impedance is taken as {usual.EXTERNAL_Z0:g} times that of the positive sequence",
 }
 """Key of ``[network.sequences]`` → what is taken without it."""

@@ -187,6 +187,12 @@ def test_a_fault_in_words(text, given):
     assert (fault.bus, fault.time, fault.duration, fault.cleared_by) == given
 
 
+@pytest.mark.parametrize("opened", ["it", "one pole"])
+def test_at_a_bus_a_fault_opens_a_line_by_its_name(opened):
+    with pytest.raises(InputError, match="at a bus it names the line, as in 'opens line_7_9'"):
+        event_of(Option.FAULT, f"bus_9, 150 ms, opens {opened}")
+
+
 @pytest.mark.parametrize(
     "text", ["bus_9 150 ms", "bus_9, 150", "bus_9", "bus_9, -1 ms", "bus_9, 150 ms, line_7_9"]
 )
