@@ -25,7 +25,8 @@ from fmus.vendor_dll.state_trial import Trial
 
 _LIBRARIES = {"linux64": ("dl",), "win64": (), "darwin64": ()}
 _LONGEST = 60  # time for a DLL to tell what it is, or for the trial, from when it is loaded [s]
-_MOST_READINGS = 8  # of a DLL; each file that it names may make it name another, and in practice two are enough
+_MOST_READINGS = 8
+"""Of a DLL: each file that it names may make it name another, and in practice two readings are enough."""
 
 _FORMATS = (
     (b"\x7fELF\x02", "linux64", "a library for 64-bit Linux"),
