@@ -10,12 +10,17 @@ from dataclasses import replace
 import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers
+from orchestrator.core.errors import AnalysisError, ComponentError, InputError
 from orchestrator.studies.validation.event import EventComparison, JumpDoubt
 from orchestrator.studies.validation.figures import SIGNALS, signals_of
 from orchestrator.studies.validation.hidden import jumps_of
+from orchestrator.studies.validation.questions import Question, QuestionKind
 
 _LONG = 0.005  # interval between samples [s], from which on the moment of a jump matters
 _LONG_STEP = 2e-4  # communication step [s] above which a jump is seen late by what matters
+# of another step its part of the device's own, how many times what changes with it is the doubt, and how that is named
+_OTHER_STEPS = ((0.5, 2.0, JumpDoubt.STEP), (2.0, 1.0, JumpDoubt.FIXED_STEP))
+_REFUSED = (ComponentError, AnalysisError, InputError)  # by a device that does not run so
 
 
 def with_doubt_between(comparison: EventComparison) -> EventComparison:
@@ -23,7 +28,9 @@ def with_doubt_between(comparison: EventComparison) -> EventComparison:
 
     The device runs again with all jumps right after the sample before, and right before the sample after. Of a
     recording with short intervals it runs with half the step, if that is long: its voltage is held, so that the error
-    falls with the step, and is twice what half of it changes."""
+    falls with the step, and is twice what half of it changes. A device that refuses half its step, as a DLL with a
+    fixed one does, runs with twice the step, which changes as much as the step itself makes. If it does not run again
+    at all, the doubt is not known, and a question says so."""
     event = comparison.event
     recording, device = event.recording, comparison.device
     jumps = [sample for sample, _ in jumps_of(event)]
@@ -31,13 +38,36 @@ def with_doubt_between(comparison: EventComparison) -> EventComparison:
         return comparison
     if recording.interval >= _LONG:
         moved = [replace(recording, jumps=dict.fromkeys(jumps, part)) for part in (0.0, 1.0)]
-        powers = [device.play(one, event.start).power for one in moved]
+        try:
+            powers = [device.play(one, event.start).power for one in moved]
+        except _REFUSED as error:
+            return _with_question(comparison, "time between two samples", error)
         return replace(_doubted(comparison, powers), doubt=JumpDoubt.SAMPLES)
     if device.step_size > _LONG_STEP:
-        finer = replace(device, step_size=0.5 * device.step_size)
-        powers = [finer.play(recording, event.start).power]
-        return replace(_doubted(comparison, powers, 2.0), doubt=JumpDoubt.STEP)
+        return _with_doubt_of_step(comparison)
     return comparison
+
+
+def _with_doubt_of_step(comparison: EventComparison) -> EventComparison:
+    """The comparison with what the communication step makes of a jump counted as noise, or a question in its place."""
+    event, device = comparison.event, comparison.device
+    refused: Exception | None = None
+    for part, factor, doubt in _OTHER_STEPS:
+        other = replace(device, step_size=part * device.step_size)
+        try:
+            power = other.play(event.recording, event.start).power
+        except _REFUSED as error:
+            refused = refused or error
+        else:
+            return replace(_doubted(comparison, [power], factor), doubt=doubt)
+    step = f"step of {1000 * device.step_size:.4g} ms"
+    return comparison if refused is None else _with_question(comparison, step, refused)
+
+
+def _with_question(comparison: EventComparison, of: str, refused: Exception) -> EventComparison:
+    """The comparison with a question: the device did not run again to show what that makes of its error."""
+    question = Question(QuestionKind.DOUBT_UNKNOWN, {"of": of, "said": str(refused)})
+    return replace(comparison, questions=(*comparison.questions, question))
 
 
 def _doubted(

@@ -62,6 +62,7 @@ class JumpDoubt(StrEnum):
 
     SAMPLES = "samples"  # when it jumped between two of them
     STEP = "step"  # the device sees it at the begin of a step
+    FIXED_STEP = "fixed step"  # likewise, of a device that refuses a shorter one
 
 
 @dataclass(frozen=True)

@@ -61,6 +61,7 @@ class OpenCause(StrEnum):
     SCATTER = "scatter"
     SAMPLES = "samples"
     STEP = "step"
+    FIXED_STEP = "fixed step"
     NO_FIGURE = "no figure"
 
 
@@ -135,6 +136,8 @@ def _why_open(one: Criterion, comparison: EventComparison) -> OpenCause | None:
     match comparison.doubt:
         case JumpDoubt.STEP:
             return OpenCause.STEP
+        case JumpDoubt.FIXED_STEP:
+            return OpenCause.FIXED_STEP
         case JumpDoubt.SAMPLES:
             return OpenCause.SAMPLES
     return OpenCause.SCATTER

@@ -22,6 +22,7 @@ class QuestionKind(StrEnum):
     NO_STEADY_STATE = "no steady state before"
     NO_EVENT = "no event"
     SLOW_SAMPLES = "slow samples"
+    DOUBT_UNKNOWN = "doubt unknown"
     MISSING = "missing samples"
     FILLED = "filled samples"
     UNMEASURED = "P or Q missing"

@@ -141,6 +141,14 @@ def _slow_samples(x: Figures) -> str:
     )
 
 
+def _doubt_unknown(x: Figures) -> str:
+    return (
+        f"the device does not run again as it must to show what the {x['of']} makes of the error where the voltage "
+        f"jumps ({x['said']}): no error around the jump is judged. Give a recording in which the voltage moves without "
+        "a jump"
+    )
+
+
 def _missing(x: Figures) -> str:
     return (
         f"{x['count']} of {x['of']} samples are missing, for up to {x['longest']:.3g} s: they are bridged in the "
@@ -303,6 +311,7 @@ _SENTENCES: Mapping[QuestionKind, Callable[[Figures], str]] = {
     QuestionKind.NO_STEADY_STATE: _no_steady_state,
     QuestionKind.NO_EVENT: _no_event,
     QuestionKind.SLOW_SAMPLES: _slow_samples,
+    QuestionKind.DOUBT_UNKNOWN: _doubt_unknown,
     QuestionKind.MISSING: _missing,
     QuestionKind.FILLED: _filled,
     QuestionKind.UNMEASURED: _unmeasured,
@@ -359,6 +368,8 @@ _WHY_OPEN = {
     OpenCause.SCATTER: "the recording's own scatter is as large as the limit",
     OpenCause.SAMPLES: "between two samples it is not known when the voltage jumped",
     OpenCause.STEP: "the device sees a jump of the voltage only at the begin of its step",
+    OpenCause.FIXED_STEP: "the device sees a jump of the voltage only at the begin of its step, and refuses a "
+    "shorter one",
     OpenCause.NO_FIGURE: "the recording shows none",
 }
 

@@ -7,6 +7,8 @@ import pandas as pd
 import pytest
 
 import orchestrator as gfor
+from orchestrator.core.errors import ComponentError
+from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.view import parts
 
 S_N = 200.0  # rating [MVA]
@@ -128,3 +130,49 @@ def test_a_fit_in_long_steps_finds_the_plants_droop_within_its_interval(seed):
     fine, coarse = rows["100 us"], rows["1 ms"]
     assert coarse.low.item() <= 0.048 <= coarse.high.item()
     assert coarse.value.item() == pytest.approx(fine.value.item(), abs=1e-5)
+
+
+def refuse_other_steps(monkeypatch, allowed):
+    """Let devices refuse each communication step but these [s], as a vendor's DLL with a fixed one does."""
+    play = PlayedDevice.play
+
+    def picky(device, recording, start):
+        if not any(np.isclose(device.step_size, one) for one in allowed):
+            said = f"only steps of {allowed} s"
+            raise ComponentError(device.name, "fmi2DoStep", "error", said, 0.0)
+        return play(device, recording, start)
+
+    monkeypatch.setattr(PlayedDevice, "play", picky)
+
+
+def open_limit(step, tmp_path, most="0.02"):
+    limits = tmp_path / "limits.toml"
+    limits.write_text(LIMITS.replace("0.06", most))
+    frame = recording(droop_at(*dip()))
+    return gfor.validate("gfor_phasor", frame, values={"S_n": S_N}, step=step, limits=str(limits))
+
+
+def test_a_device_that_refuses_half_its_step_is_doubted_by_twice_the_step(tmp_path, monkeypatch):
+    free = open_limit("10 ms", tmp_path).as_json()["events"][0]["windows"][1]["q"]
+    refuse_other_steps(monkeypatch, (0.01, 0.02))
+    found = open_limit("10 ms", tmp_path)
+    fixed = found.as_json()["events"][0]["windows"][1]["q"]
+    assert 0.3 < fixed["max_of_noise_pu"] / free["max_of_noise_pu"] < 3
+    assert found.verdict == "open"
+    (criterion,) = found.as_json()["criteria"]
+    assert criterion["why_open"] == "fixed step"
+    first = str(next(iter(parts(found))))
+    assert "refuses a shorter one" in first
+    assert "--step" not in first  # no remedy that the device refuses
+
+
+def test_a_device_that_takes_one_step_alone_is_compared_and_its_doubt_said_to_be_unknown(
+    tmp_path, monkeypatch
+):
+    refuse_other_steps(monkeypatch, (0.01,))
+    found = open_limit("10 ms", tmp_path, most="10")  # met by far, but for the doubt
+    (event,) = found.as_json()["events"]
+    assert event["windows"][1]["q"]["max_error_pu"] > 0
+    (question,) = [one for one in event["questions"] if one["kind"] == "doubt unknown"]
+    assert question["keeps_open"]
+    assert found.verdict == "open"
