@@ -5,6 +5,7 @@ PSS/E's step is 5 ms."""
 
 import json
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -152,6 +153,15 @@ def deviation(t, ours, wanted):
     swing = np.ptp(wanted[t > EVENT]) / 2
     of_swing = 100 * np.abs(ours - wanted)[np.abs(t - EVENT) > NEAR + 1e-9] / swing
     return float(np.sqrt(np.mean(of_swing**2))), float(of_swing.max())
+
+
+@pytest.mark.parametrize("off", [-1e-12, 1e-12])
+def test_a_turbine_at_its_load_limit_is_none_beyond_it(off, tmp_path, monkeypatch):
+    """The machine gives just what A_T allows: rounding of the power flow must not choose the response."""
+    at_limit = partial(three_buses, given=1 + off)
+    monkeypatch.setitem(globals(), "three_buses", at_limit)
+    rms, _ = deviation(*beside("gast", tmp_path))
+    assert rms == pytest.approx(0.1254, abs=1e-3)
 
 
 @pytest.mark.parametrize("name", RECORDED)
