@@ -181,6 +181,10 @@ GALLERY = {
         "--dyr-approximate",
         then="REPCA1 left out, as dyr_leave_out says",
     ),
+    "control at another bus": Broken("for the terminal", NINE, following(BUSR=2)),
+    "turbine without its shaft": Broken(
+        "and the shaft turns at rated speed", NINE, following(plant="3 'WTARA1' 1 0.007 0 /\n")
+    ),
     "stabiliser alone": Broken(
         "at a machine without an exciter acts on nothing",
         NINE,

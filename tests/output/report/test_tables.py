@@ -112,7 +112,10 @@ def shifts(folder):
 
 @pytest.mark.parametrize("where", ["printed", "page"])
 def test_the_shift_by_the_communication_step(where, request, studied, summary):
-    rows, known = table(request.getfixturevalue(where), "Shift of", "[rad/s]"), shifts(studied[0])
+    rows, known = (
+        table(request.getfixturevalue(where), "How far each communication step", "[rad/s]"),
+        shifts(studied[0]),
+    )
     cells = 0
     for row in rows:
         name = summary[row["Scenario"]]["name"]

@@ -22,12 +22,13 @@ def _refuse_choice(record: DynamicRecord, field: DyrField, value: float) -> None
     if field.name == _BUS:
         if value == record.bus:
             return
-        coarser = f", or {APPROXIMATING} for {MODEL}" if record.name in FIELDS else ""
+        instead = "for the terminal"
+        if record.name in FIELDS:
+            instead = f"for the terminal, or {APPROXIMATING} for {MODEL}"
         raise InputError.at(
             record.place,
             f"{record.name} has {_BUS} = {value:g}: its control measures at another bus "
-            f"than its terminal, which no part of ours does; write {_BUS} = 0 for the "
-            f"terminal{coarser}",
+            f"than its terminal, which no part of ours does; write {_BUS} = 0 {instead}",
         )
     allowed = " or ".join(f"{x:g}" for x in field.only)
     raise InputError.at(
