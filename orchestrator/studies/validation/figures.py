@@ -51,13 +51,15 @@ class ErrorFigures:
     mean_of_noise: float
     mean_abs_of_noise: float
 
-    def doubted(self, doubt: Numbers) -> ErrorFigures:
-        """The same with a doubt of each sample's error counted as noise [pu]."""
+    def doubted(self, doubt: Numbers, *, of_mean: bool = True) -> ErrorFigures:
+        """The same with a doubt of each sample's error counted as noise [pu].
+
+        ``of_mean``: Whether it may have the same sign throughout, so that the mean error is in doubt as well."""
         most, usual = float(doubt.max(initial=0.0)), float(doubt.mean())
         return replace(
             self,
             max_of_noise=self.max_of_noise + most,
-            mean_of_noise=self.mean_of_noise + usual,
+            mean_of_noise=self.mean_of_noise + (usual if of_mean else 0.0),
             mean_abs_of_noise=self.mean_abs_of_noise + usual,
         )
 

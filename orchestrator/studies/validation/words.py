@@ -9,7 +9,7 @@ from orchestrator.core.options import Option
 from orchestrator.studies.validation.beside import WindowApart
 from orchestrator.studies.validation.causes import CauseKind, Explanation
 from orchestrator.studies.validation.device import PlayedDevice
-from orchestrator.studies.validation.event import EventComparison
+from orchestrator.studies.validation.event import EventComparison, JumpDoubt
 from orchestrator.studies.validation.fit import Fit, FittedParameter, Untold
 from orchestrator.studies.validation.limits import Criterion, LimitVerdict, OpenCause
 from orchestrator.studies.validation.questions import Question, QuestionKind
@@ -358,10 +358,13 @@ def error_sentence(comparisons: Sequence[EventComparison]) -> str:
     """Say how large the largest error of P or Q is, and where."""
     one = max(comparisons, key=lambda each: each.largest_error[2].max_error)
     window, signal, figures = one.largest_error
-    return (
+    text = (
         f"the largest error is {figures.max_error:.3g} pu, of {signal.upper()} {window} the event of "
         f"{one.event.recording.label}, at {figures.max_at:.4g} s"
     )
+    if one.doubt is JumpDoubt.SAMPLES and figures.max_of_noise >= figures.max_error:
+        text += ", which is no more than the moment of the voltage's jump between two samples makes"
+    return text
 
 
 _WHY_OPEN = {
