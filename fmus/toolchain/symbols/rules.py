@@ -48,6 +48,8 @@ def _add(x: Expr, y: Expr) -> Expr:
         return _mul(TWO, x)
     if x.op == Op.SUB and _same(x.b, y):
         return x.a
+    if y.op == Op.SUB and _same(x, y.b):
+        return y.a
     return node(Op.ADD, x, y)
 
 
@@ -133,6 +135,8 @@ def _div(x: Expr, y: Expr) -> Expr:
         return _div(ONE, y.a)
     if p == Op.NEG:
         return -_div(x.a, y)
+    if q == Op.NEG:
+        return -_div(x, y.a)
     return node(Op.DIV, x, y)
 
 
