@@ -27,14 +27,18 @@ def clipped_run(values: Numbers) -> tuple[int, int] | None:
         (low, high)
         for end in (values.max(), values.min())
         for low, high in runs_of(values == end)
-        if high - low >= _FEWEST and _comes_at_speed(changes, low, high, fast)
+        if high - low >= _FEWEST and _comes_at_speed(values, low, high, fast)
     ]
     return max(found, key=lambda run: run[1] - run[0], default=None)
 
 
-def _comes_at_speed(changes: Numbers, low: int, high: int, fast: float) -> bool:
-    """Return whether a signal that moves from sample to sample comes fast to a run of still ones."""
+def _comes_at_speed(values: Numbers, low: int, high: int, fast: float) -> bool:
+    """Return whether a signal that moves from sample to sample comes fast to a run of still ones.
+
+    One with noise is cut in several runs beside each other: at the same end of the range it need not move."""
+    changes, there = np.diff(values), values == values[low]
     before = np.abs(changes[max(0, low - 1 - _BEFORE) : max(0, low - 1)])
-    beside = np.concatenate([changes[max(0, low - 1 - _BESIDE) : low], changes[high:][:_BESIDE]])
-    moves = float(np.mean(beside == 0)) <= _STILL
+    still = (changes == 0) & ~there[1:]
+    beside = np.concatenate([still[max(0, low - 1 - _BESIDE) : low], still[high:][:_BESIDE]])
+    moves = float(np.mean(beside)) <= _STILL
     return moves and len(before) == _BEFORE and float(before.mean()) > fast
