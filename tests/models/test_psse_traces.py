@@ -5,7 +5,6 @@ PSS/E's step is 5 ms."""
 
 import json
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -72,6 +71,7 @@ class Recorded:
     records: str
     four: bool = False
     reference: float | None = None
+    given: float = 1.0  # power of the machine in the network of three buses [pu]
 
 
 RECORDED = {
@@ -94,7 +94,8 @@ RECORDED = {
         "102 IEEEST 1 1 0 1.013 0.013 0 0 1.013 0.113 0 0.02 0 0 1.65 1.65 3 0.1 -0.1 0 0 /"
     ),
     "gast": Recorded(
-        f"102 GENROU 1 {ROUND} 0 1 /\n102 ESAC1A 1 {PLAIN_AC1A} /\n102 GAST 1 0.05 0.2 0.2 2 1 2.5 1.1 0.01 0 /"
+        f"102 GENROU 1 {ROUND} 0 1 /\n102 ESAC1A 1 {PLAIN_AC1A} /\n102 GAST 1 0.05 0.2 0.2 2 1 2.5 1.1 0.01 0 /",
+        given=1 - 1e-5,  # just below its load limit, which PSS/E takes it for
     ),
     "hygov": Recorded(
         f"102 GENROU 1 {ROUND} 0 1 /\n{SEXS}\n102 HYGOV 1 0.05 0.075 12 0.5 20.5 0.1 1 0 15 1.5 0 0.08 /"
@@ -126,7 +127,7 @@ def beside(name, folder):
     trace, recorded = TRACES[name], RECORDED[name]
     if recorded.reference is not None:
         return beside_a_step(trace, recorded, folder)
-    network, after = four_buses() if recorded.four else three_buses()
+    network, after = four_buses() if recorded.four else three_buses(given=recorded.given)
     rating, source = (500.0, 0.4j) if recorded.four else (100.0, 0.25j)
     alone = OneMachine(recorded.records, folder, network, rating=rating, source=source)
     wanted, every = np.array(trace["values"]), trace["every"]
@@ -156,12 +157,14 @@ def deviation(t, ours, wanted):
 
 
 @pytest.mark.parametrize("off", [-1e-12, 1e-12])
-def test_a_turbine_at_its_load_limit_is_none_beyond_it(off, tmp_path, monkeypatch):
-    """The machine gives just what A_T allows: rounding of the power flow must not choose the response."""
-    at_limit = partial(three_buses, given=1 + off)
-    monkeypatch.setitem(globals(), "three_buses", at_limit)
+def test_rounding_of_the_power_flow_does_not_choose_the_response_of_gast(
+    off, tmp_path, monkeypatch
+):
+    """At A_T itself its limit has headroom, so that its modes are those of small changes: 0.8 % off the recording."""
+    exact = three_buses(given=1 + off)
+    monkeypatch.setitem(globals(), "three_buses", lambda **_: exact)
     rms, _ = deviation(*beside("gast", tmp_path))
-    assert rms == pytest.approx(0.1254, abs=1e-3)
+    assert rms == pytest.approx(0.788, abs=1e-3)
 
 
 @pytest.mark.parametrize("name", RECORDED)

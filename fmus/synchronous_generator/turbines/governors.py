@@ -42,10 +42,10 @@ from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and
 
 SOURCE = "typical data, IEEE PES-TR1"
 
-_HEADROOM = 1e-3  # fuel [pu] of GAST's limit above an operating point beyond A_T: enough for rest
-_AT_LIMIT = (
-    1e-6  # power [pu] by which a machine at A_T may exceed it: what a power flow leaves open
+_HEADROOM = (
+    1e-3  # fuel [pu] of GAST's limit above an operating point at A_T or beyond: enough for rest
 )
+_AT_LIMIT = 1e-6  # power [pu] below A_T that is at it: what rounding of a power flow leaves open
 
 LONGEST_DELAY = 0.25
 """Longest delay of an engine [s]: Padé's fraction of second order keeps its phase within 3 degrees up to 8 rad/s."""
@@ -186,7 +186,7 @@ def gast(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
         )
         D_turb = power(m, "D_turb", 0.0, "Damping of the turbine", 0)
         require_within(m, P_m_0, low, high, ("governor.V_MIN", "governor.V_MAX"))
-        held = if_else(P_m_0 < A_T + _AT_LIMIT, fmax(A_T, P_m_0), P_m_0 + _HEADROOM)
+        held = if_else(P_m_0 < A_T - _AT_LIMIT, A_T, P_m_0 + _HEADROOM)
         exhaust = m.state("exhaust", P_m_0, "pu", "Measured temperature of the exhaust", base="S_n")
         wanted = fmin(power_reference(m, P_m_0) - (w - 1) / R, held + K_T * (held - exhaust))
         valve = blocks.limited_low_pass(m, "valve", wanted, T_1, low, high, initial=P_m_0)
