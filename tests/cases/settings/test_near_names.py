@@ -46,7 +46,7 @@ def test_a_bus_that_is_not_there_is_one_error_with_near_names(tmp_path, old, new
 
 def test_an_unknown_kind_of_event_names_the_near_one(tmp_path):
     (problem,) = problems(tmp_path, CASE + EVENT)
-    assert "type 'fault' is unknown; did you mean bus_fault?" in problem
+    assert "type 'fault' is unknown; did you mean bus_fault or line_fault?" in problem
 
 
 def test_a_variable_of_a_part_is_found_without_the_part(tmp_path):
