@@ -8,9 +8,9 @@ Without a negative sequence nothing is lowered, to the last bit."""
 from dataclasses import dataclass
 
 from fmus.converter_parts.filter import MeasuredFilter
-from fmus.toolchain.frames import ZERO, qd_state
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, if_else, logic_and, logic_or
+from gfor_fmu.sequences import declare_sequences
 
 _TAU = 0.02  # time constant with which the sequences are told apart [s]
 _GAIN = 60.0  # rate at which the limit falls for 1 pu of current above it [1/s]
@@ -87,13 +87,7 @@ def declare_phase_limit(m: ModelBuilder, f: MeasuredFilter, omega_b: Expr, w: Ex
             base="S_n",
             minimum=0.0,
         )
-        positive = qd_state(m, "positive", f.initial.i_g, "Positive sequence of the grid current")
-        negative = qd_state(m, "negative", ZERO, "Negative sequence of the grid current")
-        offset = qd_state(m, "offset", ZERO, "Direct current of its phases")
-        left = (f.i_g.value - positive.value - negative.value - offset.value) / _TAU
-        positive.set_derivative(m, left)
-        negative.set_derivative(m, left - 2 * w * omega_b * negative.value.times_j())
-        offset.set_derivative(m, left - w * omega_b * offset.value.times_j())
+        positive, negative = declare_sequences(m, f, omega_b, w, _TAU)
         cut = m.state("cut", 0.0, "1", "Part of the current's limit that is taken away")
         present = m.state("present", 0.0, "pu", "Negative sequence behind a lag", base="S_n")
     size = negative.value.magnitude()
