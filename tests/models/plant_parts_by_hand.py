@@ -6,6 +6,8 @@ do not act here."""
 
 import numpy as np
 
+from tests.models import by_hand
+
 
 class Hand:
     """A plant of some records.
@@ -161,21 +163,12 @@ class Hand:
 
     def eigenvalues(self, h=1e-7):
         """Of the plant at its source [1/s]."""
-        names = list(self.x)
-        columns = []
-        for name in names:
-            ends = [self.rates(self.x | {name: self.x[name] + side * h}) for side in (1, -1)]
-            columns.append([(ends[0][n] - ends[1][n]) / (2 * h) for n in names])
-        return np.linalg.eigvals(np.array(columns).T)
+        return by_hand.eigenvalues(self.rates, self.x, h)
 
     def run(self, source, until, step):
         """|v| at every step after the source has jumped, by Runge and Kutta's method."""
         x, found = dict(self.x), []
         for _ in range(round(until / step) + 1):
             found.append(self.at_network(x, source)[0])
-            k1 = self.rates(x, source)
-            k2 = self.rates({n: x[n] + step / 2 * k1[n] for n in x}, source)
-            k3 = self.rates({n: x[n] + step / 2 * k2[n] for n in x}, source)
-            k4 = self.rates({n: x[n] + step * k3[n] for n in x}, source)
-            x = {n: x[n] + step / 6 * (k1[n] + 2 * k2[n] + 2 * k3[n] + k4[n]) for n in x}
+            x = by_hand.stepped(lambda at: self.rates(at, source), x, step)
         return np.array(found)

@@ -5,6 +5,7 @@ import pytest
 
 from fmus.regfm_b1.dyr_fields import REGFM_B1_RECORDS
 from fmus.regfm_b1.model import regfm_b1_phasor
+from tests.models import by_hand
 from tests.models.parts import integrated, refused
 from tests.support.evaluated import Evaluated
 
@@ -68,22 +69,13 @@ class Hand:
         }
 
     def eigenvalues(self, h=1e-7):
-        names = list(self.x)
-        columns = []
-        for name in names:
-            up, down = (self.rates(self.x | {name: self.x[name] + s * h}) for s in (1, -1))
-            columns.append([(up[n] - down[n]) / (2 * h) for n in names])
-        return np.linalg.eigvals(np.array(columns).T)
+        return by_hand.eigenvalues(self.rates, self.x, h)
 
     def run(self, source, until, step):
         x, found = dict(self.x), []
         for _ in range(round(until / step) + 1):
             found.append(self.flow(x, source)[1])
-            k1 = self.rates(x, source)
-            k2 = self.rates({n: x[n] + step / 2 * k1[n] for n in x}, source)
-            k3 = self.rates({n: x[n] + step / 2 * k2[n] for n in x}, source)
-            k4 = self.rates({n: x[n] + step * k3[n] for n in x}, source)
-            x = {n: x[n] + step / 6 * (k1[n] + 2 * k2[n] + 2 * k3[n] + k4[n]) for n in x}
+            x = by_hand.stepped(lambda at: self.rates(at, source), x, step)
         return np.array(found)
 
 
