@@ -6,6 +6,8 @@ from dataclasses import replace
 from orchestrator.cases.form.schema import UnitReconnectionTable
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.scenario.start_values import is_connected
+from orchestrator.systems.coupling.events import UnitSwitching
+from orchestrator.systems.coupling.relays import Relay
 from orchestrator.systems.coupling.schedule import Schedule
 from orchestrator.systems.coupling.system import System
 
@@ -50,4 +52,18 @@ def without_units(prepared: PreparedScenario, gone: Sequence[str]) -> PreparedSc
     schedule: Schedule = replace(
         prepared.schedule, groups=tuple(group for group in groups if group)
     )
-    return replace(prepared, system=system, schedule=schedule)
+    return replace(
+        prepared, system=system, schedule=schedule, relays=_without(prepared.relays, gone)
+    )
+
+
+def _without(relays: Sequence[Relay], gone: Sequence[str]) -> tuple[Relay, ...]:
+    """Return the relays that have anything to do without some units."""
+    found = []
+    for relay in relays:
+        orders = tuple(
+            x for x in relay.orders if not (isinstance(x, UnitSwitching) and x.unit in gone)
+        )
+        if orders:
+            found.append(replace(relay, orders=orders))
+    return tuple(found)

@@ -1,10 +1,28 @@
-"""Findings of what relays did in a run: who, when, and what the relay saw."""
+"""The relays of a run, and findings of what they did: who, when, and what the relay saw."""
 
+from math import inf
+
+from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.cases.scenario.start_values import is_connected
 from orchestrator.simulation.watch.finding import TRIP, Finding
-from orchestrator.systems.coupling.events import LoadChange
-from orchestrator.systems.coupling.relays import Shedding, Trip
+from orchestrator.systems.coupling.events import LoadChange, UnitSwitching
+from orchestrator.systems.coupling.relays import Relays, Shedding, Trip
 
 _UNITS = {"voltage": "pu", "frequency": "Hz"}
+
+
+def relays_in(prepared: PreparedScenario) -> Relays:
+    """Return the relays of a scenario for one run, which know the units that are off or go off without them."""
+    events = [event for event in prepared.events if isinstance(event, UnitSwitching)]
+    orders = (order for relay in prepared.relays for order in relay.orders)
+    plans, begun = prepared.system.components, dict[str, UnitSwitching]()
+    for order in orders:
+        if isinstance(order, UnitSwitching) and order.unit in plans:
+            grid = plans[order.component]
+            is_on = is_connected(grid, f"{order.unit}.connected")
+            if not (is_on and is_connected(plans[order.unit], "connected")):
+                begun[order.unit] = UnitSwitching(-inf, order.component, order.unit, False)
+    return Relays(prepared.relays, prepared.step_size, [*begun.values(), *events])
 
 
 def finding_of(trip: Trip) -> Finding:

@@ -35,6 +35,7 @@ from orchestrator.output.results.recording import ENDED_EARLY, TRAJECTORY, Recor
 from orchestrator.output.results.storage import trajectory_dataset
 from orchestrator.simulation.engine import ENGINES, Engine, Federates
 from orchestrator.simulation.watch.finding import NOT_JUDGED, UNSTABLE, Finding
+from orchestrator.simulation.watch.relay_trips import relays_in
 from orchestrator.simulation.watch.watch import Watch
 from orchestrator.studies.modes.linear import NoLinearResponseError, linear_response
 from orchestrator.studies.modes.modes import ModesResult, modes_of, running, unknown_modes
@@ -44,7 +45,7 @@ from orchestrator.studies.runs.checkpoints import Checkpoints
 from orchestrator.studies.runs.ring_down import ring_down_of
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.observers import Observer
-from orchestrator.systems.coupling.relays import Relays, Trip
+from orchestrator.systems.coupling.relays import Trip
 from orchestrator.systems.coupling.run_state import NOT_KEPT
 from orchestrator.systems.coupling.schedule import jacobi
 from orchestrator.systems.coupling.statistics import StepStatistics
@@ -181,7 +182,7 @@ def _run(
     statistics = None
     failure: CosimError | None = None
     after = modes_after(prepared, frequency_range)
-    relays = Relays(prepared.relays, prepared.step_size)
+    relays = relays_in(prepared)
     guards = [relays] if prepared.relays else []
     with running(prepared, engine, threads) as master:
         protections = {

@@ -90,10 +90,19 @@ class Trip:
 
 
 class Relays:
-    """All relays of a run: an observer that orders events."""
+    """All relays of a run: an observer that orders events.
 
-    def __init__(self, relays: Sequence[Relay], step_size: float) -> None:
+    ``switchings``: of units by the run's own events; one at t = −∞ is of a unit that begins out of service. A relay of
+    a unit that is off has nothing to trip."""
+
+    def __init__(
+        self,
+        relays: Sequence[Relay],
+        step_size: float,
+        switchings: Sequence[UnitSwitching] = (),
+    ) -> None:
         self.relays = tuple(relays)
+        self._switchings = sorted(switchings, key=lambda event: event.time)
         self.every = max(1, round(LOOK_EVERY / step_size))
         self._least = _ROUND_OFF * step_size
         self._state = np.full((len(self.relays), _COLUMNS), inf)
@@ -162,9 +171,11 @@ class Relays:
         return found
 
     def _events_of(self, k: int, before: Sequence[Trip]) -> tuple[Event, ...]:
-        """Return the events of a relay without those of units that trips before have taken off."""
+        """Return the events of a relay without those of units that are off already."""
         time, scale = self._state[k, [_OPENED, _SCALE]].tolist()
         off = {e.unit for trip in before for e in trip.events if isinstance(e, UnitSwitching)}
+        on = {e.unit: e.connected for e in self._switchings if e.time <= time}
+        off.update(unit for unit, connected in on.items() if not connected)
         found: list[Event] = []
         for order in self.relays[k].orders:
             if isinstance(order, Shedding):

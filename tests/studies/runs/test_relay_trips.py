@@ -201,6 +201,20 @@ def test_the_answer_the_file_and_the_findings_say_who_tripped(prepared):
     assert result.after.modes == [] or not any("sg2" in n for n in result.after.model.names)
 
 
+TAKEN_OFF: Event = {"type": "unit_trip", "unit": "sg2", "time": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("events", "values"),
+    [([TAKEN_OFF, fault(1.0, 0.15)], {}), ([fault(1.0, 0.15)], {"sg2.connected": False})],
+)
+def test_a_unit_that_is_off_already_is_not_tripped_again(prepared, events, values):
+    ready = prepared(["1 'VTGTPAT' 2 2 '1' 0.8 9 0.05 0"], events)
+    (ready,) = ready.case.prepare(["tried"], values, None, 2.0)
+    assert len(ready.relays) == 1
+    assert run_scenario(ready).trips == []
+
+
 def test_what_relays_know_goes_on_with_a_run_that_is_taken_up(prepared):
     ready = prepared(["2 'LVSHBL' 1 0.8 0.05 0.4 0 0 0 0 0 0 0.02"], [fault(1.0, 0.15)])
     trips = run_scenario(ready).trips
