@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import brentq
 
 from fmus.synchronous_generator.composed import synchronous_generator, synchronous_generator_phasor
-from fmus.synchronous_generator.declarations import require_rising
+from fmus.synchronous_generator.saturation import require_rising
 from fmus.synchronous_generator.parts import EXCITERS
 from fmus.toolchain.model_builder import ModelBuilder
 from tests.models.parts import AT_BUS, AT_REST, BUS, E_FD, V_T, exciter, integrated, refused

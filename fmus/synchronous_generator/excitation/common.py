@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from fmus.synchronous_generator import declarations
+from fmus.synchronous_generator import declarations, saturation
 from fmus.synchronous_generator.data_lines import Given
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import (
@@ -209,7 +209,7 @@ def exciter_saturation(
         for k, value in ((1, S_E1), (2, S_E2))
     ]
     points = ((E[0], S[0]), (E[1], S[1]))
-    declarations.require_rising(m, *points, "exciter.E_1, S_E1, E_2, S_E2")
+    saturation.require_rising(m, *points, "exciter.E_1, S_E1, E_2, S_E2")
     return ExciterSaturation(points)
 
 
@@ -221,7 +221,7 @@ class ExciterSaturation:
 
     def part(self, E: Expr) -> Expr:
         """S_E(E)·E [pu]; 0 for a negative voltage."""
-        return declarations.saturated_part(E, *self._points)
+        return saturation.saturated_part(E, *self._points)
 
 
 def rectifier(I_N: Expr) -> Expr:

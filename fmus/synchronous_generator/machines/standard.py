@@ -23,9 +23,9 @@ from functools import partial
 from fmus.synchronous_generator.axis import Axis, Winding
 from fmus.synchronous_generator.conversion import LEAST_LEAKAGE, AxisData, RotorBranches
 from fmus.synchronous_generator.conversion import classical as classical_branches
-from fmus.synchronous_generator.declarations import exponential_part, require_rising, saturated_part
 from fmus.synchronous_generator.machine import FluxDeclaration, Machine, Start, flux_state
 from fmus.synchronous_generator.machines.base import Common, declare_common, reactance, time
+from fmus.synchronous_generator.saturation import exponential_part, require_rising, saturated_part
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort

@@ -19,9 +19,9 @@ Sources: OpenIPSL at 2be0558a (equations), InterPSS at 2b791e9 (order of the fie
 from dataclasses import dataclass, field, replace
 
 from fmus.synchronous_generator.axis import Axis, Winding
-from fmus.synchronous_generator.declarations import require_rising, saturated_part
 from fmus.synchronous_generator.machine import FluxDeclaration, Machine, Start, flux_state
 from fmus.synchronous_generator.machines.base import declare_common, reactance, time
+from fmus.synchronous_generator.saturation import require_rising, saturated_part
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import BREAKER_TIME, DevicePort

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from orchestrator.cases.draft import Draft
-from orchestrator.cases.events.sequence_assembly import FAULT, Changed, SequenceAssembly
+from orchestrator.cases.events.sequence_networks import FAULT, Changed, SequenceAssembly
 from orchestrator.cases.flow.power_flow import PowerFlow
 from orchestrator.cases.flow.solved_fault import SolvedFault
 from orchestrator.cases.networks import sequence_data as usual

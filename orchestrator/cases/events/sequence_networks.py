@@ -17,7 +17,7 @@ from orchestrator.cases.draft import Draft
 from orchestrator.cases.flow.balance import FlowLine
 from orchestrator.cases.flow.induction_impedances import negative_admittance
 from orchestrator.cases.flow.power_flow import PowerFlow
-from orchestrator.cases.flow.sequence_networks import SequenceNetwork
+from orchestrator.cases.flow.sequence_impedances import SequenceNetwork
 from orchestrator.cases.flow.source_impedances import (
     external_impedance,
     machine_base,
