@@ -156,7 +156,7 @@ OWN = {
     "studies.added": "the code of an installed distribution",
     "studies.points.code": "our own code",
     "studies.points.key": "check_regular before it",
-    "output.report.cells": "results",
+    "output.report.explorer_cells": "results",
     "output.report.html.chapters.files": "results",
     "output.report.html.chapters.devices": "pictures beside a result",
     "output.report.html.chapters.studies": "results",

@@ -5,8 +5,8 @@ import pytest
 from scipy.optimize import brentq
 
 from fmus.synchronous_generator.composed import synchronous_generator, synchronous_generator_phasor
-from fmus.synchronous_generator.saturation import require_rising
 from fmus.synchronous_generator.parts import EXCITERS
+from fmus.synchronous_generator.saturation import require_rising
 from fmus.toolchain.model_builder import ModelBuilder
 from tests.models.parts import AT_BUS, AT_REST, BUS, E_FD, V_T, exciter, integrated, refused
 from tests.support.evaluated import Evaluated

@@ -11,8 +11,8 @@ from orchestrator.core.safe_files import made_folder
 from orchestrator.core.truth import NoTruth
 from orchestrator.output.report.notebook import page
 from orchestrator.output.results.lock import held
-from orchestrator.studies.certification.codes.voltage_source import files, measurement
-from orchestrator.studies.certification.codes.voltage_source.point import AtPoint
+from orchestrator.studies.certification.codes.frequency import files, measurement
+from orchestrator.studies.certification.codes.frequency.point import AtPoint
 from orchestrator.studies.certification.kinds import bench_request
 from orchestrator.studies.certification.request import rated_frequency
 

@@ -33,7 +33,7 @@ from orchestrator.output.signatures.signing import check_key
 from orchestrator.simulation.watch.finding import MISFIT
 from orchestrator.studies.certification.acceptance import read_checks, run_checks
 from orchestrator.studies.certification.certificate import Certificate, DampingCertificate
-from orchestrator.studies.certification.codes import frequency_domain
+from orchestrator.studies.certification.codes import perturbation_plot
 from orchestrator.studies.certification.codes.nts631 import NTS631
 from orchestrator.studies.certification.codes.row import checked, in_words, like
 from orchestrator.studies.certification.codes.row_verdict import NO_VERDICT, NOT_JUDGED
@@ -306,7 +306,7 @@ def run_stiffness(options: argparse.Namespace, device: Device) -> int:
     if options.json:
         print_json(figures)
         return 0
-    for line in frequency_domain.stiffness_in_words(figures):
+    for line in perturbation_plot.stiffness_in_words(figures):
         console.print(escape(line), highlight=False)
     console.print(escape(figures["phase_jump"]["sentence"]), soft_wrap=True, highlight=False)
     console.print(escape(figures["sentence"][:1].upper() + figures["sentence"][1:]), soft_wrap=True)
@@ -319,6 +319,6 @@ def measured_figures(device: Device, folder: Path) -> tuple[dict[str, Any], list
     made_folder(folder, "--out")
     with said_stages() as report:
         f_n = rated_frequency(request, 50.0)
-        found = frequency_domain.measure_stiffness(request, f_n, report)
-    files = frequency_domain.save_stiffness(found, request.fmu.stem, f_n, folder)
-    return frequency_domain.figures_of_stiffness(found, request.fmu.stem, f_n), files
+        found = perturbation_plot.measure_stiffness(request, f_n, report)
+    files = perturbation_plot.save_stiffness(found, request.fmu.stem, f_n, folder)
+    return perturbation_plot.figures_of_stiffness(found, request.fmu.stem, f_n), files

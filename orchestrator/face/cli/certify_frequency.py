@@ -43,8 +43,8 @@ def run_frequency(options: argparse.Namespace, device: Device) -> int:
 def measured_behaviour(device: Device, folder: Path) -> tuple[dict[str, Any], list[Path]]:
     """Measure a device at each operating point, and write figures, impedances and their picture."""
     # scipy, for other codes in vain
-    from orchestrator.studies.certification.codes.voltage_source import files  # noqa: PLC0415
-    from orchestrator.studies.certification.codes.voltage_source.measurement import (  # noqa: PLC0415
+    from orchestrator.studies.certification.codes.frequency import files  # noqa: PLC0415
+    from orchestrator.studies.certification.codes.frequency.measurement import (  # noqa: PLC0415
         measure_points,
     )
 

@@ -27,9 +27,9 @@ from orchestrator.output.report.tables import PlainTable, make_table
 from orchestrator.output.results.lock import held
 from orchestrator.studies.certification.acceptance import KEPT
 from orchestrator.studies.certification.certificate import Certificate
-from orchestrator.studies.certification.codes.frequency_domain import stiffness_in_words
 from orchestrator.studies.certification.codes.known import codes_by_declaration
 from orchestrator.studies.certification.codes.nts631 import NTS631
+from orchestrator.studies.certification.codes.perturbation_plot import stiffness_in_words
 from orchestrator.studies.certification.codes.row import checked
 from orchestrator.studies.certification.matrix import (
     FIGURES,

@@ -15,7 +15,8 @@ from orchestrator.face.cli.terminal import (
     print_parts,
     saying_warnings,
 )
-from orchestrator.output.report.tables import eigenvalue_text, make_table
+from orchestrator.output.report.mode_tables import eigenvalue_text
+from orchestrator.output.report.tables import make_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

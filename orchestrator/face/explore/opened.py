@@ -10,7 +10,7 @@ import xarray as xr
 from orchestrator.core.errors import InputError
 from orchestrator.face.api.case import Case, load
 from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ
-from orchestrator.output.report.cells import CELLS, check_case, found_from, read_cells
+from orchestrator.output.report.explorer_cells import CELLS, check_case, found_from, read_cells
 from orchestrator.output.report.html.charts import ChartCurve, thinned
 from orchestrator.output.report.html.folder import SUMMARY
 from orchestrator.output.results.readers import has_reader

@@ -1,13 +1,52 @@
-"""Tables over the JSON of scenarios: a terminal shows them of what was computed, a page of what was kept."""
+"""Modes in tables: with how many digits an eigenvalue, its frequency and its damping stand there, and tables of them.
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+The tables are over the JSON of scenarios: a terminal shows them of what was computed, a page of what was kept."""
 
-from orchestrator.output.report.table import ShownCell, ShownTable, damping
-from orchestrator.output.report.tables import eigenvalue_text
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, TypeVar
+
+from orchestrator.output.report.table import Column, Marked, ShownCell, ShownTable
 
 Content = Mapping[str, Any]
 """The JSON of a scenario, or a part of it."""
+
+Row = TypeVar("Row")
+
+LEAST_DAMPING = 5.0
+"""Damping ratio [%] below which it is marked: what a certificate asks for."""
+
+
+def eigenvalue_text(value: complex, digits: int = 4) -> str:
+    """``-0.3892 ± j3.6551``."""
+    return f"{value.real:+.{digits}f} ± j{abs(value.imag):.{digits}f}"
+
+
+def damping(percent: float | None) -> ShownCell:
+    """Return the damping ratio [%] with two digits, marked if it is poor."""
+    text = "–" if percent is None else f"{percent:.2f}"
+    return Marked(text, "bad") if percent is not None and percent < LEAST_DAMPING else text
+
+
+def verdict(stable: bool | None) -> str | Marked:
+    words: dict[bool | None, str | Marked] = {
+        True: "stable",
+        False: Marked("UNSTABLE", "bad"),
+        None: "not known",
+    }
+    return words[stable]
+
+
+def mode_columns(mode_of: Callable[[Row], Any]) -> list[Column[Row]]:
+    """Columns of an eigenvalue [rad/s], its frequency [Hz] and its damping ratio [%]."""
+    return [
+        Column("Mode [rad/s]", lambda row: mode_of(row).eigenvalue, eigenvalue_text),
+        Column("", lambda row: mode_of(row).eigenvalue.real, name="real"),
+        Column("", lambda row: mode_of(row).eigenvalue.imag, name="imag"),
+        Column("f [Hz]", lambda row: mode_of(row).frequency_hz, ".4f", name="frequency_hz"),
+        Column(
+            "Damping [%]", lambda row: mode_of(row).damping_percent, damping, name="damping_percent"
+        ),
+    ]
 
 
 def named_modes(

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from orchestrator.core.late import pd
 from orchestrator.output.report.html.elements import table as table_of_page
-from orchestrator.output.report.tables import PlainTable, eigenvalue_text, make_table
+from orchestrator.output.report.tables import PlainTable, make_table
 from orchestrator.output.results.storage import save_table
 
 Row = TypeVar("Row")
@@ -21,7 +21,6 @@ Row = TypeVar("Row")
 _DATE = r"\d{4}-\d\d-\d\d( \d\d:\d\d:\d\d)?"
 _MINUS = re.compile(r"^-(?=\d)")
 _ON_TERMINALS = {"good": "bold green", "bad": "bold red", "soft": "bold yellow"}
-LEAST_DAMPING = 5.0  # [%]; less is marked
 
 
 @dataclass(frozen=True)
@@ -178,31 +177,3 @@ def _on_page(cell: str | Marked) -> str:
     if isinstance(cell, Marked):
         return f'<span class="{cell.mark}">{_on_page(cell.text)}</span>'
     return _MINUS.sub("−", escape(cell)).replace("\n", "<br>")
-
-
-def damping(percent: float | None) -> ShownCell:
-    """Return the damping ratio [%] with two digits, marked if it is poor."""
-    text = "–" if percent is None else f"{percent:.2f}"
-    return Marked(text, "bad") if percent is not None and percent < LEAST_DAMPING else text
-
-
-def verdict(stable: bool | None) -> str | Marked:
-    words: dict[bool | None, str | Marked] = {
-        True: "stable",
-        False: Marked("UNSTABLE", "bad"),
-        None: "not known",
-    }
-    return words[stable]
-
-
-def mode_columns(mode_of: Callable[[Row], Any]) -> list[Column[Row]]:
-    """Columns of an eigenvalue [rad/s], its frequency [Hz] and its damping ratio [%]."""
-    return [
-        Column("Mode [rad/s]", lambda row: mode_of(row).eigenvalue, eigenvalue_text),
-        Column("", lambda row: mode_of(row).eigenvalue.real, name="real"),
-        Column("", lambda row: mode_of(row).eigenvalue.imag, name="imag"),
-        Column("f [Hz]", lambda row: mode_of(row).frequency_hz, ".4f", name="frequency_hz"),
-        Column(
-            "Damping [%]", lambda row: mode_of(row).damping_percent, damping, name="damping_percent"
-        ),
-    ]

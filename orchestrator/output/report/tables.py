@@ -159,8 +159,3 @@ def _in_columns(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]
 def _bounds(variable: VariableInfo) -> str:
     bounds = ["" if b is None else f"{b:g}" for b in (variable.minimum, variable.maximum)]
     return "…".join(bounds) if any(bounds) else ""
-
-
-def eigenvalue_text(value: complex, digits: int = 4) -> str:
-    """``-0.3892 ± j3.6551``."""
-    return f"{value.real:+.{digits}f} ± j{abs(value.imag):.{digits}f}"

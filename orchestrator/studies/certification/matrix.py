@@ -15,8 +15,8 @@ from orchestrator.devices.fmi.values import as_text
 from orchestrator.output.report.html.elements import document, table
 from orchestrator.output.results.storage import save_json
 from orchestrator.studies.certification.certificate import Certificate
-from orchestrator.studies.certification.codes.frequency_domain import FIGURES_JSON, FIGURES_PNG
 from orchestrator.studies.certification.codes.needs_record import NEEDS_HTML, NEEDS_JSON
+from orchestrator.studies.certification.codes.perturbation_plot import FIGURES_JSON, FIGURES_PNG
 from orchestrator.studies.certification.environment import environment
 from orchestrator.studies.certification.files import HTML, JSON
 from orchestrator.studies.certification.margins import CriterionMargin, margin_text, narrowest

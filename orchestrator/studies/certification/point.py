@@ -16,7 +16,7 @@ from orchestrator.linear.spectra.modes import find_spectrum
 from orchestrator.linear.spectra.stability import judge
 from orchestrator.simulation.watch.watch import Watch
 from orchestrator.studies.black_box.coupled_modes import is_black_box, linearize_with_box
-from orchestrator.studies.certification.frequency import bus_frequency
+from orchestrator.studies.certification.bus_frequency import bus_frequency
 from orchestrator.studies.modes.modes import modes_of, running
 from orchestrator.studies.modes.naming import named_modes
 from orchestrator.studies.points.failure import Failure, failure_kept

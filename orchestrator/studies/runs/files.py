@@ -12,7 +12,7 @@ from orchestrator.cases.scenario.flow_figures import power_flow_json
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import RunInterruptedError
 from orchestrator.core.safe_files import write_bytes
-from orchestrator.output.report.cells import word_of
+from orchestrator.output.report.explorer_cells import word_of
 from orchestrator.output.report.power_flow import COLUMNS
 from orchestrator.output.results.recorded import in_memory, open_whole
 from orchestrator.output.results.recording import TRAJECTORY

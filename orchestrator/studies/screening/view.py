@@ -16,7 +16,7 @@ from orchestrator.core.errors import Problem, counted, few
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder, write_text
 from orchestrator.core.truth import NoTruth
-from orchestrator.output.report.cells import CELLS, Cell, CellLine, Cells
+from orchestrator.output.report.explorer_cells import CELLS, Cell, CellLine, Cells
 from orchestrator.output.report.html.charts import (
     ChartCurve,
     Mark,
@@ -25,9 +25,10 @@ from orchestrator.output.report.html.charts import (
     line_chart,
 )
 from orchestrator.output.report.html.elements import SHADES, Figures, colour, document
+from orchestrator.output.report.mode_tables import damping, eigenvalue_text
 from orchestrator.output.report.notebook import page
-from orchestrator.output.report.table import Column, ColumnTable, Marked, damping
-from orchestrator.output.report.tables import eigenvalue_text, kinds_of
+from orchestrator.output.report.table import Column, ColumnTable, Marked
+from orchestrator.output.report.tables import kinds_of
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.output.results.staging import new_run_id, staged
 from orchestrator.output.results.storage import save_json

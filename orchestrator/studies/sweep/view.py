@@ -9,7 +9,7 @@ from orchestrator.core.errors import InputError
 from orchestrator.core.late import pd, xr
 from orchestrator.core.safe_files import made_folder
 from orchestrator.core.truth import NoTruth
-from orchestrator.output.report.cells import CELLS, Cell, CellLine, Cells
+from orchestrator.output.report.explorer_cells import CELLS, Cell, CellLine, Cells
 from orchestrator.output.report.notebook import Axes, axes_or_new, page
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.output.results.staging import new_run_id, staged

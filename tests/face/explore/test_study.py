@@ -13,7 +13,7 @@ from orchestrator.face.cli import main
 from orchestrator.face.explore.copied import copied
 from orchestrator.face.explore.server import Explorer
 from orchestrator.face.explore.worker import Desk
-from orchestrator.output.report.cells import read_cells
+from orchestrator.output.report.explorer_cells import read_cells
 from tests.face.explore.test_page import (
     browser,
     computed,

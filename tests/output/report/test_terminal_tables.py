@@ -6,7 +6,8 @@ import pytest
 from rich.console import Console
 
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.output.report.tables import eigenvalue_text, first_few, fmu_variables, make_table
+from orchestrator.output.report.mode_tables import eigenvalue_text
+from orchestrator.output.report.tables import first_few, fmu_variables, make_table
 
 
 def printed(table, width=160):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.studies.black_box.frequency_response import FrequencyResponse
-from orchestrator.studies.certification.codes.frequency_domain import stiffness
+from orchestrator.studies.certification.codes.stiffness import stiffness
 
 OMEGA_B = 2 * np.pi * 50
 STEP = 1e-6

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.linear.spectra.mode_tracking import ModeSet
+from orchestrator.studies.certification.bus_frequency import bus_frequency
 from orchestrator.studies.certification.criteria import (
     _partners,
     critical_mode,
@@ -13,7 +14,6 @@ from orchestrator.studies.certification.criteria import (
     neighbouring_modes,
     stability_fault,
 )
-from orchestrator.studies.certification.frequency import bus_frequency
 from orchestrator.studies.certification.judgement import PointVerdict
 
 

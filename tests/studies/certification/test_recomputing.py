@@ -10,7 +10,7 @@ import xarray as xr
 
 from orchestrator.face.cli import main
 from orchestrator.studies.certification import case_file
-from orchestrator.studies.certification.frequency import bus_frequency
+from orchestrator.studies.certification.bus_frequency import bus_frequency
 from orchestrator.studies.certification.point import FREQUENCY, POWER
 from tests.support.bindings import GFOR
 

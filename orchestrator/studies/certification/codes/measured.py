@@ -10,7 +10,7 @@ import numpy as np
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import InputError
 from orchestrator.simulation.watch.finding import NOT_JUDGED, UNSTABLE
-from orchestrator.studies.certification.frequency import bus_frequency
+from orchestrator.studies.certification.bus_frequency import bus_frequency
 
 NOTHING = 5e-3
 """Apparent power below which a plant feeds in nothing [pu]."""

@@ -8,14 +8,12 @@ import pytest
 import orchestrator as gfor
 from orchestrator.core.errors import ComponentError
 from orchestrator.studies.black_box.frequency_response import Excitation
-from orchestrator.studies.certification.codes import bench_point, frequency_domain
+from orchestrator.studies.certification.codes import bench_point, perturbation_plot
 from orchestrator.studies.certification.codes.all_codes import ERCOT
 from orchestrator.studies.certification.codes.certificate import certify_code
-from orchestrator.studies.certification.codes.frequency_domain import (
-    asked_stiffness,
-    measure_stiffness,
-)
+from orchestrator.studies.certification.codes.frequency.limits import asked_stiffness
 from orchestrator.studies.certification.codes.known import code_for
+from orchestrator.studies.certification.codes.perturbation_plot import measure_stiffness
 from orchestrator.studies.certification.files import save
 from orchestrator.studies.certification.request import CertificationRequest
 from orchestrator.studies.certification.verification import read_certificate, verify_files
@@ -142,7 +140,7 @@ def test_the_command_asks_for_what_is_to_be_declared(converter, gfor_command):
 def test_the_stiffness_that_a_jump_asks_for_agrees_with_the_jump(tmp_path, monkeypatch, X, stiff):
     """A source behind a reactance: 1/X to 1/X/(1 − (f/f_n)²) against 1/(10°/0.2 pu − |Z|²/X_g) = 1.87 pu/rad."""
     monkeypatch.setattr(
-        frequency_domain, "EXCITATION", Excitation(lowest_hz=5.0, highest_hz=40.0, lines=8)
+        perturbation_plot, "EXCITATION", Excitation(lowest_hz=5.0, highest_hz=40.0, lines=8)
     )
     request = CertificationRequest(write_source(tmp_path), None, {"X": X})
     asked = asked_stiffness(measure_stiffness(request, 60.0, lambda text: None), 60.0)
@@ -162,7 +160,7 @@ def test_gb_gives_figures_and_no_verdict(converter, tmp_path, gfor_command, monk
     see the transformer, Q/V = 1/X_t/(1 − (f/f_n)²), but for the voltage loop of 50 ms.
     """
     quick = Excitation(lowest_hz=0.5, highest_hz=20.0, lines=8)
-    monkeypatch.setattr(frequency_domain, "EXCITATION", quick)
+    monkeypatch.setattr(perturbation_plot, "EXCITATION", quick)
     out = tmp_path / "gb"
     code, printed, _ = gfor_command("certify", converter, "--code", "gb", "--out", out, "--json")
     assert code == 0

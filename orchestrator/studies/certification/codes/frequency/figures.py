@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers, Vector
-from orchestrator.studies.certification.codes.frequency_domain import (
+from orchestrator.studies.certification.codes.frequency.limits import (
     AskedStiffness,
-    Stiffness,
     asked_stiffness,
 )
+from orchestrator.studies.certification.codes.stiffness import Stiffness
 
 TOLD = (1.0, 300.0)  # frequencies of impedances and passivity [Hz]
 SLOW = 0.5  # highest frequency from which inertia and damping are read [Hz]

@@ -6,7 +6,7 @@ figures."""
 
 from collections.abc import Sequence
 
-from orchestrator.studies.certification.codes.voltage_source.point import AtPoint
+from orchestrator.studies.certification.codes.frequency.point import AtPoint
 
 SOURCES = (
     "limit: MISO BPM-015 r32 appendix H, 0.2 pu against a jump of 10° at SCR 3, by this program's derivation for the "

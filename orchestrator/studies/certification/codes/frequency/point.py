@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.studies.certification.codes.voltage_source.figures import (
+from orchestrator.studies.certification.codes.frequency.figures import (
     Impedances,
     Springs,
     TerminalSwing,
 )
-from orchestrator.studies.certification.codes.voltage_source.strength import Strengths
+from orchestrator.studies.certification.codes.frequency.strength import Strengths
 
 NAMED = (
     1.0,

@@ -1,48 +1,29 @@
 """GB: the network-frequency-perturbation plot of a converter, and how stiff a source it is; without a verdict."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.output.report.plot_style import STYLE, colour, save_figure
 from orchestrator.output.results.storage import save_json, save_table
-from orchestrator.studies.black_box.frequency_response import Excitation, FrequencyResponse
-from orchestrator.studies.certification.codes.programme import jumps
+from orchestrator.studies.black_box.frequency_response import Excitation
+from orchestrator.studies.certification.codes.frequency.limits import (
+    POWER,
+    AskedStiffness,
+    asked_stiffness,
+)
 from orchestrator.studies.certification.codes.response_at_point import point_values, response_at
+from orchestrator.studies.certification.codes.stiffness import Stiffness, stiffness
 from orchestrator.studies.certification.request import CertificationRequest
-from orchestrator.studies.immittance.forms import powers_over, rows_of
-
-
-@dataclass(frozen=True)
-class Stiffness:
-    """Powers that a device feeds in, over changes of the voltage at its terminals, at frequencies [Hz]."""
-
-    frequencies: Numbers
-    powers: dict[str, Complex]  # as of `powers_over`
-
-    def least(self, name: str, low: float, high: float) -> tuple[float, float]:
-        inside = np.flatnonzero((self.frequencies >= low) & (self.frequencies <= high))
-        if not len(inside):
-            raise ValueError(f"no frequency was measured from {low:g} to {high:g} Hz")
-        sizes = np.abs(self.powers[name][inside])
-        return float(sizes.min()), float(self.frequencies[inside[int(np.argmin(sizes))]])
-
-
-def stiffness(response: FrequencyResponse, voltage: complex, f_n: float) -> Stiffness:
-    f, Y, current = response.frequencies, response.continuous(), complex(*response.operating_point)
-    return Stiffness(f, powers_over(f, Y, voltage, current, f_n))
-
+from orchestrator.studies.immittance.forms import rows_of
 
 # names of files in a certificate's folder
 FIGURES_CSV = "frequency.csv"
 FIGURES_JSON = "frequency.json"
 FIGURES_PNG = "frequency.png"
 
-POWER = 0.5  # active power at which it is measured [pu]
 # band in which the least stiffness is told [Hz]: between the droops and the period of the grid
 BAND = (5.0, 40.0)
 EXCITATION = Excitation()  # how it is excited: from 0.05 to 1000 Hz
@@ -51,46 +32,6 @@ NO_VERDICT = (
     "no verdict: the GB Grid Code (ECP.A.3.9) states no criteria for the plot, and the thresholds and the band of "
     f"arXiv 2605.02131 were not at hand; {BAND[0]:g} to {BAND[1]:g} Hz is this program's band"
 )
-
-JUMP, OPPOSED, SCR, LONGEST = np.deg2rad(10.0), 0.2, 3.0, 0.015
-"""What MISO and ERCOT ask in time: a power [pu] against a jump of the angle [rad] at a short-circuit ratio, and 90 % of
-the first change within a time [s] (MISO BPM-015 r32 appendix H)."""
-
-
-@dataclass(frozen=True)
-class AskedStiffness:
-    """The least |P/θ| that the criterion of phase jumps comes to, and the |P/θ| that was found."""
-
-    value: float  # least |P/θ| that it asks for at the terminals [pu/rad]
-    band: tuple[float, float]  # frequencies at which it asks for it [Hz]
-    # found, at: least |P/θ| in the band [pu/rad], and its frequency [Hz].
-    found: float
-    at: float
-
-    @property
-    def met(self) -> bool:
-        return self.found >= self.value
-
-    def sentence(self) -> str:
-        low, high = self.band
-        return (
-            f"{OPPOSED:g} pu against {np.rad2deg(JUMP):g}° at SCR {SCR:g} (MISO, ERCOT) asks, by this program's "
-            f"derivation, for |P/θ| of {self.value:.3g} pu/rad from {low:.3g} to {high:.3g} Hz: "
-            f"{'met' if self.met else 'not met'}, {self.found:.3g} at {self.at:.3g} Hz; no code says so"
-        )
-
-
-def asked_stiffness(found: Stiffness, f_n: float) -> AskedStiffness:
-    """Compare a device with what the criterion of phase jumps comes to.
-
-    A stiffness K at the terminals and that of the grid, K_g = X/|Z|², lie in series: a jump Δθ of the source moves the
-    power by Δθ/(1/K + 1/K_g), which is to be `OPPOSED` or more. The power is a mean over a period T, so that K has to
-    last as long: an angle that follows the bus with the time constant T has its corner at 1/(2π·T). And 90 % of the
-    change within `LONGEST` is what a lag of `LONGEST`/ln 10 reaches, whose corner is the upper end of the band."""
-    Z = jumps(SCR, POWER, ()).impedance
-    asked = 1 / (JUMP / OPPOSED - abs(Z) ** 2 / Z.imag)
-    band = (f_n / (2 * np.pi), float(np.log(10) / (2 * np.pi * LONGEST)))
-    return AskedStiffness(float(asked), band, *found.least("P/theta", *band))
 
 
 def measure_stiffness(

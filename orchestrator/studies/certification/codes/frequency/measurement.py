@@ -7,21 +7,21 @@ import numpy as np
 from orchestrator.core.errors import AnalysisError
 from orchestrator.studies.black_box.fitting import bands_of, passivity, require_fitting
 from orchestrator.studies.black_box.frequency_response import Excitation, FrequencyResponse
-from orchestrator.studies.certification.codes.frequency_domain import stiffness
-from orchestrator.studies.certification.codes.response_at_point import point_values, response_at
-from orchestrator.studies.certification.codes.voltage_source.figures import (
+from orchestrator.studies.certification.codes.frequency.figures import (
     SLOW,
     TOLD,
     impedances,
     springs,
     swing,
 )
-from orchestrator.studies.certification.codes.voltage_source.point import (
+from orchestrator.studies.certification.codes.frequency.point import (
     POINTS,
     AtPoint,
     ScannedPoint,
 )
-from orchestrator.studies.certification.codes.voltage_source.strength import strengths
+from orchestrator.studies.certification.codes.frequency.strength import strengths
+from orchestrator.studies.certification.codes.response_at_point import point_values, response_at
+from orchestrator.studies.certification.codes.stiffness import stiffness
 from orchestrator.studies.certification.request import CertificationRequest
 
 # at the first operating point, from 0.05 Hz on, where inertia shows

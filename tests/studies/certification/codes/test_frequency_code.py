@@ -10,30 +10,27 @@ import orchestrator as gfor
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.studies.black_box.frequency_response import Excitation, measure
 from orchestrator.studies.black_box.port import bench_at
-from orchestrator.studies.certification.codes.frequency_domain import (
-    Stiffness,
-    asked_stiffness,
-    stiffness,
-)
-from orchestrator.studies.certification.codes.voltage_source import files, measurement
-from orchestrator.studies.certification.codes.voltage_source.figures import (
+from orchestrator.studies.certification.codes.frequency import files, measurement
+from orchestrator.studies.certification.codes.frequency.figures import (
     impedances,
     springs,
     swing,
 )
-from orchestrator.studies.certification.codes.voltage_source.point import (
+from orchestrator.studies.certification.codes.frequency.limits import asked_stiffness
+from orchestrator.studies.certification.codes.frequency.point import (
     POINTS,
     AtPoint,
     ScannedPoint,
 )
-from orchestrator.studies.certification.codes.voltage_source.strength import (
+from orchestrator.studies.certification.codes.frequency.strength import (
     RATIOS,
     AtRatio,
     Strengths,
     closed_loop,
     least_damped,
 )
-from orchestrator.studies.certification.codes.voltage_source.verdict import sentence_of, verdict_of
+from orchestrator.studies.certification.codes.frequency.verdict import sentence_of, verdict_of
+from orchestrator.studies.certification.codes.stiffness import Stiffness, stiffness
 from orchestrator.studies.immittance.forms import powers_over
 from tests.studies.certification.codes.impostor import write_impostor
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from orchestrator.output.report.plot_style import STYLE, colour, save_figure
 from orchestrator.output.results.storage import save_json, save_table
-from orchestrator.studies.certification.codes.voltage_source.point import AtPoint
-from orchestrator.studies.certification.codes.voltage_source.verdict import (
+from orchestrator.studies.certification.codes.frequency.point import AtPoint
+from orchestrator.studies.certification.codes.frequency.verdict import (
     SOURCES,
     sentence_of,
     verdict_of,

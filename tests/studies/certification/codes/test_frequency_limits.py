@@ -2,7 +2,7 @@
 
 import pytest
 
-from orchestrator.studies.certification.codes.frequency_domain import (
+from orchestrator.studies.certification.codes.frequency.limits import (
     JUMP,
     OPPOSED,
     POWER,

@@ -8,7 +8,7 @@ from scipy.linalg import block_diag, eigvals
 from orchestrator.core.arrays import Complex, Matrix
 from orchestrator.studies.black_box.fitting import fit
 from orchestrator.studies.black_box.frequency_response import FrequencyResponse
-from orchestrator.studies.certification.codes.voltage_source.figures import TOLD
+from orchestrator.studies.certification.codes.frequency.figures import TOLD
 from orchestrator.studies.immittance.judgement import NyquistVerdict, judge_loop
 from orchestrator.studies.immittance.loop import CutLoop
 from orchestrator.studies.immittance.measured import as_scan
