@@ -14,6 +14,11 @@ from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
+from orchestrator.studies.validation.angle_questions import (
+    questions_beside_frequency,
+    questions_of_hold,
+    questions_of_unit,
+)
 from orchestrator.studies.validation.averaging import averaged
 from orchestrator.studies.validation.channels import RecordedChannel, channels_in, in_base, unit_of
 from orchestrator.studies.validation.clipped import clipped_run
@@ -29,20 +34,12 @@ _LONGEST_GAP = 0.25  # gap [s] that a straight line bridges in the voltage that 
 # gap [s] of P or Q beside a known voltage, from which on a swing's largest error may lie in it
 _LONG_UNMEASURED = 0.1
 _TURN = 2 * np.pi
-_NEAR_A_TURN = 0.2  # part of a turn by which a jump of the angle may miss a whole one
-_AS_BESIDE = 3.0  # times the largest change beside it, by which an angle moves while it wraps
-_BESIDE_WRAP = 4  # changes before and after it that are looked at
-_MOVES = 1e-6
-"""Part of its range from which on an angle moves: more than rounding makes of an angle at rest."""
 _PERIODS_OF_ORDER = 5  # of which the order of the phases is taken
 _OTHER_ORDER = (
     3.0  # times the positive sequence, from which on a negative one is the order of the phases
 )
 _MEASURED = 2e-6  # scatter of a voltage [pu] that no simulation has and each instrument
 _SPIKE = 3.0  # jump to one sample and back [pu] that no plant makes
-_HELD = (
-    0.2  # part of the samples whose angle is that of the sample before, from which on it is held
-)
 _ROUNDS = 8  # in which the current beyond an impedance is found
 _FASTEST_PHASOR = (
     0.0021  # interval [s] below which samples of an angle may be unwrapped at any time
@@ -394,38 +391,15 @@ class _Reading:
                 + Option.CHANNEL
                 + f" '{channel.changed(unit='rad')}'"
             )
-        self._ask_of_wraps(raw, angle, channel)
+        self.questions += questions_of_unit(raw, self.angle_unit, channel)
+        self.questions += questions_of_hold(angle)
         known = np.isfinite(angle)
         angle = angle.copy()
         angle[known] = np.unwrap(angle[known])
         if "f" in self.channels:
-            self._compare_with_frequency(angle)
+            turned = self._integrated()
+            self.questions += questions_beside_frequency(self.times, angle, turned, channel)
         return np.asarray(angle)
-
-    def _ask_of_wraps(self, raw: Numbers, angle: Numbers, channel: RecordedChannel) -> None:
-        steps = np.diff(raw[np.isfinite(raw)])
-        largest = float(np.abs(steps).max(initial=0.0))
-        degrees = unit_of(channel, self.dataset) == "deg"
-        other = "rad" if degrees else "deg"
-        wraps = _wraps(steps, _TURN if degrees else 360.0)
-        if degrees and float(np.nanmax(np.abs(raw), initial=0.0)) > 1.01 * _TURN:
-            wraps = False  # radians that wrap stay within a turn
-        beyond = not degrees and float(np.nanmax(np.abs(raw[:5]), initial=0.0)) > 1.01 * _TURN
-        if wraps or beyond:
-            self.ask(
-                QuestionKind.ANGLE_UNIT,
-                jump=largest,
-                remedy=channel.changed(unit=other),
-                unit=other,
-            )
-        # an angle that has not begun to move is not held: the count begins with the first that moves
-        known = angle[np.isfinite(angle)]
-        moved = np.abs(known - known[:1]) > _MOVES * np.ptp(known) if len(known) else known > 0
-        begin = int(np.argmax(moved)) if moved.any() else 0
-        held = float(np.mean(np.diff(known[begin:]) == 0))
-        moves = float(np.ptp(angle[np.isfinite(angle)])) > 1e-3
-        if moves and held > _HELD:
-            self.ask(QuestionKind.ANGLE_HELD, part=held)
 
     def _hertz(self) -> Numbers:
         values, base = self._values("f")
@@ -440,23 +414,6 @@ class _Reading:
         middle = 0.5 * (deviation[1:] + deviation[:-1]) * np.diff(self.times)
         return np.asarray(_TURN * np.concatenate([[0.0], np.nancumsum(middle)]))
 
-    def _compare_with_frequency(self, angle: Numbers) -> None:
-        """An angle that is not the integral of its own frequency has another unit, sign or frame."""
-        known = np.isfinite(angle)
-        line = np.vander(self.times[known], 2)
-        own, other = angle[known], self._integrated()[known]
-        own, other = (x - line @ np.linalg.lstsq(line, x, rcond=None)[0] for x in (own, other))
-        if np.ptp(other) < 1e-3 or np.ptp(own) < 1e-5:
-            return
-        factor = float(own @ other / (other @ other))
-        rest = float(np.std(own - factor * other) / np.std(own))
-        if not 0.5 < factor < 2 and rest < 0.5:
-            self.ask(
-                QuestionKind.ANGLE_AND_FREQUENCY,
-                factor=factor,
-                remedy=self.channels["angle"].changed(factor=round(1 / factor, 6)),
-            )
-
 
 _IN_PER_UNIT: Mapping[str, Callable[[_Reading, str], Numbers]] = {
     "v": lambda reading, role: reading._volts(role, 1.0),
@@ -469,21 +426,6 @@ def _scatters(values: Numbers) -> bool:
     """Return whether a magnitude [pu] scatters from sample to sample in its first part, as a measured one does."""
     first = values[: max(_FEWEST, len(values) // 10)]
     return float(np.diff(first, 2).std()) > _MEASURED
-
-
-def _wraps(steps: Numbers, turn: float) -> bool:
-    """Return whether the largest change of an angle is a wrap: without the turn it changes as it does beside it.
-
-    A jump of the phase does not, be it as large as a turn of another unit by chance."""
-    if not len(steps):
-        return False
-    at = int(np.abs(steps).argmax())
-    rest = abs(abs(float(steps[at])) - turn)
-    beside = np.delete(
-        np.abs(steps[max(0, at - _BESIDE_WRAP) : at + _BESIDE_WRAP + 1]), min(at, _BESIDE_WRAP)
-    )
-    moves = _AS_BESIDE * float(beside.max(initial=0.0)) + 1e-3 * turn
-    return rest < min(moves, _NEAR_A_TURN * turn)
 
 
 def _evened(reading: _Reading, voltage: Complex, power: Complex) -> Recording:
