@@ -3,7 +3,7 @@
    z: parameters, inputs, outputs; memory: the states. */
 enum { S_N, P_0, Q_0, V_0, THETA_0, GAIN, TAU, IN_1, IN_2, IN_3, OUT_1, OUT_2, OUT_3, OMEGA, SHOWN, POD_K, POD_T_W, POD_T_F, POD_LIMIT, DELTA_P, SIZE };
 enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, TICK, PENDING, ON, QUICK, SLOW, TIRED, DIPS, LOW, WOUND, BLOCKED, ANGLE, RING, RINGING,
-       LAGGED, TRIPLED, VOLT, P_NOW, SINCE, OVER, WASHED, PASSED, K_AT_START, AGE, WORKED, WAS_ON, SWITCHED, STORED, USED, SUMMED, SAMPLED, MEMORY };
+       LAGGED, TRIPLED, VOLT, P_NOW, SINCE, OVER, WASHED, PASSED, K_AT_START, AGE, WORKED, WAS_ON, SWITCHED, STORED, USED, SUMMED, LAST_SAMPLE, MEMORY };
 #define SWITCH ON /* a Boolean: damping by the frequency behind a washout; with POD, a damping controller */
 #define IS_OUTPUT(r) (((r) >= OUT_1 && (r) <= SHOWN) || (r) == DELTA_P)
 #define DIVERGED 1e12
@@ -69,7 +69,7 @@ enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, TICK, PENDING, ON, 
 #define POD_SHOWN POD_UNIT
 #endif
 #ifdef POD_SAMPLES /* time [s] between two samples of its input */
-#define POD_PASSED m[SAMPLED]
+#define POD_PASSED m[LAST_SAMPLE]
 #else
 #define POD_PASSED m[PASSED]
 #endif
@@ -186,7 +186,7 @@ static void initialise(double *z, double *m) {
     m[DIPS] = m[LOW] = m[WOUND] = m[BLOCKED] = m[RING] = m[RINGING] = 0;
 #endif
     m[ANGLE] = t;
-    m[WASHED] = m[PASSED] = m[SAMPLED] = m[AGE] = m[WORKED] = m[SWITCHED] = m[USED] = m[SUMMED] = 0, m[WAS_ON] = m[ON], m[K_AT_START] = z[POD_K];
+    m[WASHED] = m[PASSED] = m[LAST_SAMPLE] = m[AGE] = m[WORKED] = m[SWITCHED] = m[USED] = m[SUMMED] = 0, m[WAS_ON] = m[ON], m[K_AT_START] = z[POD_K];
     m[STORED] = 0.5;
     m[TRIPLED] = m[OVER] = 0, m[SINCE] = 1e9, m[VOLT] = v, m[P_NOW] = m[P_F];
 #ifdef METER_BEGINS
@@ -410,7 +410,7 @@ static void substep(const double *z, double *m, double *hidden, phasor v, double
     m[PASSED] += h / z[POD_T_F] * (w - POD_WASHES * m[WASHED] - m[PASSED]);
     m[AGE] += h;
 #ifdef POD_SAMPLES
-    if (fmod(m[AGE] + h / 2, POD_SAMPLES) < h) m[SAMPLED] = m[PASSED];
+    if (fmod(m[AGE] + h / 2, POD_SAMPLES) < h) m[LAST_SAMPLE] = m[PASSED];
 #endif
     m[USED] += h * fabs(damping_power(z, m));
 #ifdef POD_INTEGRAL /* gain of its integral part [1/s]; POD_LEAK: time in which that forgets [s] */
