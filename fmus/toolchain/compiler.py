@@ -39,6 +39,12 @@ FLAGS = (
 _MAC_FLAGS = ("-Wl,-install_name,@rpath/library.dylib",)
 
 
+WASM = "wasm32-wasi"
+"""The zig target of `fmus.toolchain.component`. Its code calls nothing of WASI, as it neither reads nor writes."""
+
+_WASM_FLAGS = ("-mexec-model=reactor",)  # a library, whose functions its host calls
+_NOT_WASM = ("-shared", "-fPIC", "-fvisibility=hidden")
+
 _OWN_HEADER = re.compile(r'#include "(\w+\.[ch])"\s*$')
 
 _PREBUILT = Path(__file__).with_name("prebuilt")
@@ -132,16 +138,14 @@ def compile_for(source: str, target: str, ending: str, libraries: Sequence[str] 
     """Compile C source for one zig target; otherwise as `compile_library`.
 
     ``source``: One translation unit.
-    ``target``: One of those of a platform in `TARGETS`.
+    ``target``: One of those of a platform in `TARGETS`, or `WASM`.
     ``ending``: Of the library's file, such as ``.so``; ``.exe`` makes a program.
     ``libraries``: Of the system, that the source needs beside the C library and its mathematics, such as ``dl``."""
     require("compiling C", "ziglang")
-    flags = [*FLAGS, *_MAC_FLAGS] if target.endswith("macos") else [*FLAGS]
-    if ending == ".exe":
-        flags.remove("-shared")
-    key = hashlib.sha256("\0".join([source, target, *recipe(), *libraries]).encode()).hexdigest()[
-        :32
-    ]
+    flags = _flags(target, ending)
+    own = _WASM_FLAGS if target == WASM else ()
+    parts = [source, target, *recipe(), *own, *libraries]
+    key = hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
     library = cache_directory("libraries") / f"{key}{ending}"
     if intact(library):
         return library
@@ -168,6 +172,15 @@ def compile_for(source: str, target: str, ending: str, libraries: Sequence[str] 
         return keep(library, built.read_bytes())
     finally:
         remove(folder)
+
+
+def _flags(target: str, ending: str) -> list[str]:
+    if target == WASM:
+        return [flag for flag in FLAGS if flag not in _NOT_WASM] + [*_WASM_FLAGS]
+    flags = [*FLAGS, *_MAC_FLAGS] if target.endswith("macos") else [*FLAGS]
+    if ending == ".exe":
+        flags.remove("-shared")
+    return flags
 
 
 _MAGIC = 0xCAFEBABE

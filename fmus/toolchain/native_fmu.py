@@ -25,6 +25,7 @@ from fmus.toolchain.compiler import (
     library_of,
     recipe,
 )
+from fmus.toolchain.component import MANIFEST, PLATFORM, component_of, manifest
 from fmus.toolchain.description import model_description, with_guid
 from fmus.toolchain.exporter import this_machine
 from fmus.toolchain.extras import installed_version
@@ -154,6 +155,9 @@ def native_source(model: Model, version: FmiVersion) -> str:
     return "\n".join(parts)
 
 
+PLATFORMS = (*TARGETS, PLATFORM)
+"""What an FMU can have a binary for. A component for WebAssembly is of FMI 3.0, and only made where it is asked for."""
+
 LIBRARIES = {version: (_C / "native.c", _C / f"fmi{version[0]}.c") for version in ("2.0", "3.0")}
 
 
@@ -274,14 +278,27 @@ class NativeFmu:
         )
 
     def contents(self, platforms: tuple[str, ...]) -> dict[str, bytes]:
-        """The archive's members, with a binary for each platform [FMI 2.0 names]."""
-        code, data = identity_source(guid_of(self.digest), self.digest) + self._code, b""
+        """The archive's members, with a binary for each platform [FMI 2.0 names], or a component of FMI 3.0's draft
+        for WebAssembly."""
+        native = tuple(platform for platform in platforms if platform != PLATFORM)
+        members = self._native_contents(native)
+        if native != platforms:
+            members[f"binaries/{PLATFORM}/{self.model.name}.wasm"] = component_of(self._own_code())
+            members[MANIFEST] = manifest()
+        return members
+
+    def _own_code(self) -> str:
+        """The source with the model in it, for a binary that reads no file."""
+        identity = identity_source(guid_of(self.digest), self.digest)
+        if not self._tape:
+            return identity + self._code
+        return f"{_model_source(model_data(self.model, self._tape, self.digest))}\n{self._code}"
+
+    def _native_contents(self, platforms: tuple[str, ...]) -> dict[str, bytes]:
         members = {"modelDescription.xml": self.description()}
-        if self._tape:
-            data = model_data(self.model, self._tape, self.digest)
-            code = f"{_model_source(data)}\n{self._code}" if self._source_file else ""
-        if data and not code:
-            members["resources/model.bin"] = data
+        code = self._own_code() if self._source_file or not self._tape else ""
+        if not code:
+            members["resources/model.bin"] = model_data(self.model, self._tape, self.digest)
         if self._icons:
             members["terminalsAndIcons/terminalsAndIcons.xml"] = self._icons
         if self._source_file:

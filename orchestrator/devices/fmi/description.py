@@ -51,6 +51,8 @@ _CAUSALITIES = {
 }
 """That FMI 2.0 allows with each variability."""
 
+_WEB = "wasm32-wasip2"  # of FMI's draft for WebAssembly, which fmpy does not know
+
 _OURS = f"VendorAnnotations/Tool[@name='{TOOL}']"
 _RATED = {variable.name: variable for variable in RATED}
 _LONGEST_WHY = 200  # characters of a range's reason that are taken from a file
@@ -213,7 +215,10 @@ def read_declared(path: Path | str) -> FmuDescription:
 
 def platforms_of(archive: Path | BytesIO) -> tuple[str, ...]:
     """The platforms for which an FMU has a binary; sources are none."""
-    return tuple(name for name in fmpy.supported_platforms(archive) if name != "c-code")
+    found = tuple(name for name in fmpy.supported_platforms(archive) if name != "c-code")
+    with zipfile.ZipFile(archive) as members:
+        in_web = any(name.startswith(f"binaries/{_WEB}/") for name in members.namelist())
+    return (*found, _WEB) if in_web else found
 
 
 @uncollected()

@@ -76,7 +76,8 @@ def build(
     fmi
         ``"2.0"``, or ``"3.0"`` for native ones.
     platforms
-        Compile for these; by default for this machine's, native ones for all.
+        Compile for these; by default for this machine's, native ones for all. ``"wasm32-wasip2"``, of native FMUs of
+        FMI 3.0, adds a WebAssembly component by the draft of FMI-LS-WASM; it needs the program wasm-tools.
     extra
         Members for the FMU's ``extra/`` folder, by path, such as ``{"extra/notes.txt": b"..."}``.
     parts
@@ -117,13 +118,17 @@ def build(
         raise InputError(
             "only native FMUs are made of C source that a tool can compile; build a native one"
         )
-    from fmus.toolchain.compiler import TARGETS  # noqa: PLC0415 - as above
+    from fmus.toolchain.component import PLATFORM  # noqa: PLC0415 - as above
     from fmus.toolchain.exporter import export  # noqa: PLC0415 - needs the extra `build`
-    from fmus.toolchain.native_fmu import NativeFmu  # noqa: PLC0415 - as above
+    from fmus.toolchain.native_fmu import PLATFORMS, NativeFmu  # noqa: PLC0415 - as above
     from fmus.toolchain.python_fmu import PythonFmu  # noqa: PLC0415 - as above
 
     made = catalogue_model(model, parts) if isinstance(model, str) else model
-    chosen = None if platforms is None else _platforms(platforms, TARGETS)
+    chosen = None if platforms is None else _platforms(platforms, PLATFORMS)
+    if PLATFORM in (chosen or ()) and fmi != "3.0":
+        raise InputError(
+            f"platforms: {PLATFORM!r} is for native FMUs of FMI 3.0; build it with native=True, fmi='3.0'"
+        )
     members, place = _members(extra), _folder(folder)
     recipe = NativeFmu(made, fmi, sources=sources) if native else PythonFmu(made)
     path = export(recipe, place, chosen or None, members)

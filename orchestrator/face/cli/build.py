@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Literal
 
 from fmus.toolchain.catalogue import model_names, needs_arguments
-from fmus.toolchain.compiler import TARGETS
+from fmus.toolchain.component import PLATFORM
 from fmus.toolchain.model import FmiVersion
+from fmus.toolchain.native_fmu import PLATFORMS
 from orchestrator.cases.case import load_case
 from orchestrator.cases.form.build_choices import PARTS, RECORDS, chosen_parts
 from orchestrator.cases.scenario.prepare import PreparedScenario
@@ -72,7 +73,7 @@ _NEEDS = (
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    add_options(parser, "build", hosts=HOSTS, listed=", ".join(HOSTS), platforms=sorted(TARGETS))
+    add_options(parser, "build", hosts=HOSTS, listed=", ".join(HOSTS), platforms=sorted(PLATFORMS))
     for part in PARTS:
         parser.add_argument(
             f"--{part}",
@@ -98,6 +99,10 @@ def run(options: argparse.Namespace) -> int:
         )
     if options.sources and not options.native:
         raise InputError("--sources is for native FMUs, which are compiled from C; add --native")
+    if PLATFORM in (options.platform or ()) and options.fmi != "3.0":
+        raise InputError(
+            f"--platform {PLATFORM} is for native FMUs of FMI 3.0: add --native --fmi 3.0"
+        )
     parts = chosen_parts(options)
     if parts and not options.names:
         raise InputError(
