@@ -53,6 +53,7 @@ class DraftInput:
     # whether the case is the user's own file; an SSP is one scenario of a case, and may name components of others.
     whole: bool = True
     injections: bool = False  # as in `CaseDefinition`
+    faulted: frozenset[str] = frozenset()  # as in `CaseDefinition`
     # components whose device is another than the file's own, which no layer's value reaches.
     exchanged: frozenset[str] = frozenset()
     # variables, by ``component.variable``, that the command line or its parameter files set.

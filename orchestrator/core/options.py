@@ -30,6 +30,7 @@ class Option(Spelling, Enum):
     CHANNEL = "channel", "channels"
     CHECK = "check"
     CHECKPOINT = "checkpoint", "checkpoints"
+    CLEARED_AFTER = "cleared-after"
     CODE = "code"
     COLUMN = "column", ALONE
     COMPENSATION = "compensation"
@@ -120,6 +121,7 @@ class Option(Spelling, Enum):
     TLS = "tls"
     TOLERANCE = "tolerance"
     TRANSFORMER = "transformer"
+    TRIPS = "trips"
     TRUST_FMUS = "trust-fmus"
     TRY = "try", "steps"
     UNITS_CHECKED = "units-checked", ALONE

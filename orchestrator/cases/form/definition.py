@@ -50,6 +50,7 @@ class CaseDefinition:
     events_given: tuple[str, ...] = ()  # in words, by the caller, in the place of the file's
     # whether the grid takes a current besides at every bus; see `Network.injections`
     injections: bool = False
+    faulted: frozenset[str] = frozenset()  # buses with a fault besides those of the file's events
     # variables, by ``component.variable``, that a study varies: their values are meant, whatever is usual
     varied: frozenset[str] = frozenset()
 

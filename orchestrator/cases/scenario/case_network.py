@@ -237,6 +237,7 @@ def _with_switches(network: Network, draft: Draft, *, phasors: bool) -> Network:
         *(event for scenario in case.scenarios.values() for event in scenario.events or ()),
     ]
     faults = {table.bus for table in tables if isinstance(table, BusFaultTable)}
+    faults |= draft.given.faulted
     switched = {
         table.shunt
         for table in tables

@@ -258,6 +258,7 @@ class Preparer:
             parameter_files=case.parameter_files,
             whole=case.numbered,
             injections=case.injections,
+            faulted=case.faulted,
             exchanged=frozenset(case.exchanged),
             from_outside=outside,
             varied=case.varied,

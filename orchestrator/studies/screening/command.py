@@ -10,6 +10,7 @@ from orchestrator.studies.screening.limits import limits_table
 from orchestrator.studies.screening.point import StretchTask
 from orchestrator.studies.screening.request import ScreeningRequest
 from orchestrator.studies.screening.study import plan_screening, run_screening
+from orchestrator.studies.screening.trips import runs_table
 from orchestrator.studies.screening.view import Screening, modes_table, overview, remarks, verdict
 
 
@@ -21,6 +22,9 @@ def _parts(found: Screening) -> Iterator[RenderableType]:
     beyond = limits_table(found.summary)
     if beyond is not None:
         yield from ("", beyond)
+    ran = runs_table(found.summary)
+    if ran is not None:
+        yield from ("", ran)
     yield from ("", modes_table(found.summary), "")
 
 

@@ -21,7 +21,12 @@ from orchestrator.linear.spectra.mode_tracking import ModeSet, match
 from orchestrator.studies.modes.modes import modes_from
 from orchestrator.studies.operating_points.bench import DRIVEN, OBSERVED, PointBench
 from orchestrator.studies.operating_points.item import Item, Status
-from orchestrator.studies.operating_points.preparation import ACCEPT, ItemPreparation, failure
+from orchestrator.studies.operating_points.preparation import (
+    ACCEPT,
+    ItemPreparation,
+    failure,
+    with_moving_controls,
+)
 from orchestrator.studies.points.codec import plain
 from orchestrator.studies.points.failure import Failure
 from orchestrator.studies.points.task import Task, computed
@@ -31,7 +36,8 @@ from orchestrator.studies.screening.modes import (
     find_modes_here,
     residue,
 )
-from orchestrator.studies.screening.record import ItemRecord, StretchRecord
+from orchestrator.studies.screening.outage_runs import OutageRuns, first_bus
+from orchestrator.studies.screening.record import ItemRecord, StretchRecord, WantedRuns
 
 
 @dataclass(frozen=True)
@@ -45,6 +51,7 @@ class StretchTask(Task):
     sharing: SharingRule | None = None  # how units share an outage; as the case says where None
     # whether taps and switched shunts move after an outage, whatever the case says
     move_controls: bool = False
+    runs: WantedRuns | None = None  # of the outages as they happen
 
     def content(self) -> Any:
         """Where the points stand in their file does not count."""
@@ -53,11 +60,25 @@ class StretchTask(Task):
             [item.point - self.anchor.point, item.intact, item.values, item.out, item.lost]
             for item in chain
         ]
-        return plain([said, self.wanted, self.whole, self.sharing, self.move_controls])
+        return plain([said, self.wanted, self.whole, self.sharing, self.move_controls, self.runs])
 
     def failed(self, failure: Failure) -> StretchRecord:
         one = ItemRecord(Status.of(failure), failure.text, lasting=failure.lasting)
         return StretchRecord((one,) * (1 + len(self.items)))
+
+
+def _runs(task: StretchTask, wanted: WantedRuns, case: Case) -> OutageRuns:
+    study = task.study
+    case = with_moving_controls(case) if task.move_controls else case
+    return OutageRuns(
+        case,
+        study.scenario,
+        study.layers,
+        study.step_size,
+        task.sharing,
+        seconds=wanted.seconds,
+        cleared_after=wanted.cleared_after,
+    )
 
 
 @dataclass
@@ -88,6 +109,7 @@ class _Worker:
             move_controls=task.move_controls,
         )
         self._alone: dict[Any, Any] = {}
+        self._runs = None if task.runs is None else _runs(task, task.runs, case)
 
     def stretch(self) -> StretchRecord:
         """The stretch; where an end of it has growth that its items do not show, all of them are counted."""
@@ -146,6 +168,9 @@ class _Worker:
 
     def _record(self, results: list[_Result]) -> StretchRecord:
         items = [self._task.anchor, *self._task.items]
+        for item, result in zip(items, results, strict=True):
+            if self._runs is not None and item.lost and result.record.status is Status.COMPUTED:
+                result.record = self._with_run(item, result.record, self._runs)
         intact = [k for k, item in enumerate(items) if item.intact and results[k].found is not None]
         first = results[0].found
         last = results[intact[-1]].found if intact else None
@@ -157,6 +182,18 @@ class _Worker:
             self._bench.perturbed,
             self._bench.reused,
         )
+
+    def _with_run(self, item: Item, record: ItemRecord, runs: OutageRuns) -> ItemRecord:
+        """The record with what the outage's run shows, or that of its failure."""
+        prepared = self._preparation.base
+        losing = (one for one in self._task.items if one.lost)
+        try:
+            run = runs.run(item, {first_bus(one, prepared) for one in losing})
+            return replace(record, run=run)
+        except Exception as error:  # as that of an item: it must neither end others nor be hidden
+            kind, text, lasting = failure(error, item)
+            told = f"the run of the outage: {text}"
+            return replace(record, status=kind, text=told, stable=None, lasting=lasting)
 
     def _item(self, item: Item, neighbour: FoundModes | None, *, count: bool) -> _Result:
         warnings: tuple[str, ...] = ()

@@ -12,6 +12,49 @@ from orchestrator.studies.points.task import Kept
 
 
 @dataclass(frozen=True)
+class WantedRuns:
+    """How long the run of an outage goes on after it, and its fault before it [s]; None for no fault."""
+
+    seconds: float
+    cleared_after: float | None = None
+
+
+@dataclass(frozen=True)
+class RelayTrip:
+    """A relay that acted in the run of an outage.
+
+    ``of``: the unit, load or bus that it protects; ``time``: when its breaker opened [s]; ``seen``: voltage [pu] or
+    frequency [Hz] when it tripped."""
+
+    of: str
+    record: str
+    time: float
+    seen: float
+    message: str
+
+
+@dataclass(frozen=True)
+class WentWrong:
+    """A finding of the run of an outage that no stable system gives, with its begin [s]."""
+
+    kind: str
+    component: str
+    time: float
+    message: str
+
+
+@dataclass(frozen=True)
+class OutageRun:
+    """A run from the point before an outage, in which it happens.
+
+    ``until``: where the run ends [s]."""
+
+    until: float
+    trips: tuple[RelayTrip, ...] = ()
+    went_wrong: tuple[WentWrong, ...] = ()
+
+
+@dataclass(frozen=True)
 class ItemRecord:
     # status, text: what became of it, and why; of a computed one what was lost and who feeds it instead
     status: Status
@@ -57,6 +100,7 @@ class ItemRecord:
     lasting: bool = True  # whether computing it again would give the same
     # communication steps of the map whose modes these are; 0 of the system without a communication step
     map_steps: int = 0
+    run: OutageRun | None = None  # the outage as it happens, where that was asked for
 
 
 @dataclass(frozen=True)

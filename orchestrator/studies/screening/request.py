@@ -3,9 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
 from functools import partial
-from typing import Any
+from math import inf
+from typing import Any, cast
 
 from orchestrator.cases.flow.sharing import SharingRule
+from orchestrator.cases.form.given import Time, in_seconds
 from orchestrator.core.asked import (
     FLAG,
     OUTAGES,
@@ -18,6 +20,7 @@ from orchestrator.core.asked import (
 )
 from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
+from orchestrator.core.units import to_unit
 from orchestrator.studies.points.request import (
     POINTS_FILE,
     OverCluster,
@@ -26,8 +29,20 @@ from orchestrator.studies.points.request import (
     of_values,
 )
 from orchestrator.studies.screening.modes import MOST_DAMPING, CriticalRegion
+from orchestrator.studies.screening.record import WantedRuns
 
 _MOST = 100 * MOST_DAMPING
+
+
+def _read_time(text: str) -> float:
+    """Read a time [s] above 0."""
+    seconds = to_unit(text, "s")
+    if not 0 < seconds < inf:
+        raise ValueError(f"{text!r} is no time above 0; write such as 5 or '200 ms'")
+    return seconds
+
+
+_TIME = FieldKind("T", _read_time, in_seconds)
 _DAMPING = FieldKind(
     "PERCENT", partial(read_percent, most=_MOST), partial(percent, most=_MOST), unit="%", times=100
 )
@@ -84,6 +99,20 @@ class ScreeningRequest(OverCluster):
         python="whether taps and switched shunts of a RAW file move after an outage until voltages are in their bands, "
         "rather than being held",
     )
+    trips: Time | None = asked(
+        _TIME,
+        None,
+        "let each outage happen in a run that goes on for so long after it, such as '5 s', and say whose relays trip "
+        "and who loses synchronism",
+        python="how long a run goes on after each outage, such as ``'5 s'``: it says whose relays trip and who loses "
+        "synchronism; without it there are no runs",
+    )
+    cleared_after: Time | None = asked(
+        _TIME,
+        None,
+        "in these runs a three-phase short circuit at the first bus of what is lost lasts so long before the outage, "
+        "such as '100 ms'",
+    )
     frequencies: tuple[float, float] = of_frequencies(
         "modes from the first to the second are critical [Hz], where they are damped less than ``damping``"
     )
@@ -96,6 +125,23 @@ class ScreeningRequest(OverCluster):
         "count growing modes of all frequencies at every point; takes longer",
         python="whether growing modes of all frequencies are counted at every point, rather than at one in 24",
     )
+
+    @property
+    def wanted_runs(self) -> WantedRuns | None:
+        """The runs of the outages; None where none is asked for."""
+        if self.trips is not None:
+            after = cast("float | None", self.cleared_after)
+            return WantedRuns(cast("float", self.trips), after)
+        if self.cleared_after is not None:
+            raise InputError(
+                Option.CLEARED_AFTER
+                + " is of the runs that "
+                + Option.TRIPS
+                + " asks for; give "
+                + Option.TRIPS
+                + ", such as '5 s', as well"
+            )
+        return None
 
     @property
     def region(self) -> CriticalRegion:

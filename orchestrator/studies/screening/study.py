@@ -56,6 +56,7 @@ class ScreeningPlan(OperatingPoints):
 
 def plan_screening(case: Case, request: ScreeningRequest) -> ScreeningPlan:
     region, sharing = request.region, cast("SharingRule | None", request.sharing)
+    runs = request.wanted_runs
     case = with_moving_controls(case) if request.move_controls else case
     read = read_operating_points(case, request, request.points, request.outages, request.scenario)
     study = StudyCase.of(read.prepared, read.layers, request.step_size)
@@ -73,6 +74,7 @@ def plan_screening(case: Case, request: ScreeningRequest) -> ScreeningPlan:
                 whole=request.whole,
                 sharing=sharing,
                 move_controls=request.move_controls,
+                runs=runs,
             )
         )
     return ScreeningPlan(**vars(read), wanted=region, tasks=tuple(tasks))

@@ -79,6 +79,10 @@ class Summary:
         self.result = result
         self.counts = Counter(item.record.status for item in result.items)
         self.unstable = [item for item in result.items if item.record.stable is False]
+        self.runs = [item for item in result.items if item.record.run is not None]
+        ran = [(item, item.record.run) for item in self.runs]
+        self.tripping = [item for item, run in ran if run is not None and run.trips]
+        self.gone_wrong = [item for item, run in ran if run is not None and run.went_wrong]
         self.free = [item for item in result.items if item.record.zeros > 1]
         self.modes = self._modes()
 
@@ -110,14 +114,19 @@ class Summary:
 
     @property
     def stable(self) -> bool | None:
-        """Return whether nothing grows anywhere; None where an item has no verdict, or is missing, and none grows."""
-        return self.stable_here if self.unstable or self.result.complete else None
+        """Return whether nothing grows anywhere; None where an item has no verdict, or is missing, and none grows.
+
+        In runs of outages nothing may lose synchronism; where relays trip, what they leave has no verdict."""
+        bad = self.unstable or self.gone_wrong
+        return self.stable_here if bad or self.result.complete else None
 
     @property
     def stable_here(self) -> bool | None:
         """The same of the items that are there: of a part alone."""
-        if self.unstable:
+        if self.unstable or self.gone_wrong:
             return False
+        if self.tripping:
+            return None
         return True if all(item.record.stable for item in self.result.items) else None
 
     @property

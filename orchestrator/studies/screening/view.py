@@ -41,6 +41,7 @@ from orchestrator.studies.screening.limits import (
 )
 from orchestrator.studies.screening.study import ScreenedItem, ScreeningResult
 from orchestrator.studies.screening.summary import ModeAt, ScreenedMode, Summary, duration, least_of
+from orchestrator.studies.screening.trips import run_columns, runs_json, runs_table
 from orchestrator.studies.screening.words import (
     OutageRow,
     by_outage,
@@ -153,6 +154,7 @@ def items_table(summary: Summary) -> ColumnTable[ScreenedItem]:
                 name="why",
             ),
             *limit_columns(summary),
+            *run_columns(summary),
             Column("Why", lambda item: item.record.text),
         ),
         summary.result.items,
@@ -369,8 +371,15 @@ def _of_controls(summary: Summary) -> str:
     return f"after outages {counted} are held; --move-controls lets them move"
 
 
+def _of_relays(summary: Summary) -> str:
+    """Tell that the runs of the outages can show no trips; "" where there are relays, or no runs."""
+    if not summary.runs or summary.result.plan.prepared.relays:
+        return ""
+    return "no relay is in the case, so that nothing trips in the runs of the outages"
+
+
 def remarks(summary: Summary) -> list[str]:
-    texts = [*filter(None, [_of_controls(summary)])]
+    texts = [*filter(None, [_of_controls(summary), _of_relays(summary)])]
     for status, number in summary.counts.items():
         if status is Status.COMPUTED:
             continue
@@ -406,6 +415,7 @@ def as_json(summary: Summary) -> dict[str, Any]:
         "counts": {str(status): number for status, number in summary.counts.items()},
         "beyond_rating": summary.beyond or None,
         "limits": limits_json(summary),
+        "runs": runs_json(summary),
         "unstable": [_where(item) for item in summary.unstable],
         "failures": [
             _where(item) | {"status": str(item.record.status), "why": item.record.text}
@@ -440,6 +450,9 @@ def _page(summary: Summary) -> str:
     beyond = limits_table(summary, 20)
     if beyond is not None:
         content.append(("Ratings and voltage bands", beyond.html()))
+    ran = runs_table(summary, 20)
+    if ran is not None:
+        content.append(("Runs of the outages", ran.html()))
     content += [("Modes", modes_table(summary, 20, whole=True).html())]
     content += [("Damping and how long", _durations(summary, figures))]
     if len(plan.points) > 1:

@@ -17,6 +17,7 @@ from orchestrator.studies.screening.modes import UNSTABLE
 from orchestrator.studies.screening.record import ItemRecord
 from orchestrator.studies.screening.study import ScreenedItem, ScreeningPlan
 from orchestrator.studies.screening.summary import ModeAt, Summary, least_of
+from orchestrator.studies.screening.trips import runs_sentence
 
 
 @dataclass(frozen=True)
@@ -154,9 +155,16 @@ def verdict_of(summary: Summary) -> VerdictSentence:
     if summary.unstable:
         growing = (one.item for one in summary.least_damped() if one.item.record.stable is False)
         worst = next(growing, summary.unstable[0])
-        lost = "".join(f"; {text}" for text in (not_judged(summary), summary.beyond) if text)
+        told = (not_judged(summary), runs_sentence(summary), summary.beyond)
+        lost = "".join(f"; {text}" for text in told if text)
         text = f"at {len(summary.unstable)} of {total} points and outages; worst: {where(worst)}{_least(worst)}{lost}"
         return VerdictSentence(False, "UNSTABLE", text)
+    if summary.gone_wrong:
+        text = f"in {len(summary.gone_wrong)} of {len(summary.runs)} runs of outages, though no mode grows"
+        lost = "".join(
+            f"; {text}" for text in (runs_sentence(summary), not_judged(summary)) if text
+        )
+        return VerdictSentence(False, "UNSTABLE", f"{text}{lost}")
     computed = summary.counts[Status.COMPUTED]
     least = summary.least_damped()[:1]
     tail = f"; least damped: {where(least[0].item)}{_least(least[0].item)}" if least else ""
@@ -164,7 +172,8 @@ def verdict_of(summary: Summary) -> VerdictSentence:
         first = summary.free[0]
         zeros = zeros_in_words(first.record.zeros)
         tail += f"; at {len(summary.free)} of them, first at {where(first)}, {zeros}"
-    tail += f"; {summary.beyond}" if summary.beyond else ""
+    ran = runs_sentence(summary)
+    tail += "".join(f"; {text}" for text in (ran, summary.beyond) if text)
     if summary.stable:
         text = f"nothing grows at any of {total} points and outages{_but_slowly(summary)}{tail}"
         return VerdictSentence(True, "stable", text)
@@ -183,6 +192,8 @@ def verdict_of(summary: Summary) -> VerdictSentence:
         item.record.stable is None and item.record.counted for item in summary.result.items
     )
     missing += [f"{doubtful} stand at the edge of a limit"] if doubtful else []
+    tripping = len(summary.tripping)
+    missing += [f"what relays leave at {tripping} of them is not judged"] if tripping else []
     text = (
         f"nothing grows at {computed} of {total} points and outages, but {', '.join(missing)}{tail}"
     )

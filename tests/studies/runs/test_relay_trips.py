@@ -4,34 +4,14 @@ import numpy as np
 import pytest
 
 from orchestrator.cases.networks.record_use import UseOfRecord
-from orchestrator.cases.new.new_case import write_case
-from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.studies.modes.modes import running
 from orchestrator.studies.runs.answer_of_run import of_run
 from orchestrator.studies.runs.files import summary_of
 from orchestrator.studies.runs.run import run_scenario
 from orchestrator.systems.coupling.relays import FREQUENCY_LAG, Relays
+from tests.support.mill import mill_case
 from tests.support.scenarios import prepare_one
 
-RAW = """0, 100.0, 33, 0, 1, 60.0 / TWO BUSES
-A STIFF BUS
-AND A PLANT
-1, 'GRID', 138.0, 3, 1, 1, 1, 1.0, 0.0
-2, 'MILL', 138.0, 2, 1, 1, 1, 1.0, 0.0
-0 / END OF BUS DATA, BEGIN LOAD DATA
-2, '1', 1, 1, 1, 60.0, 15.0, 0.0, 0.0, 0.0, 0.0, 1
-2, '2', 1, 1, 1, 20.0, 5.0, 0.0, 0.0, 0.0, 0.0, 1
-0 / END OF LOAD DATA, BEGIN FIXED SHUNT DATA
-0 / END OF FIXED SHUNT DATA, BEGIN GENERATOR DATA
-1, '1', 40.0, 10.0, 500.0, -300.0, 1.0, 0, 1000.0, 0.0, 0.2, 0.0, 0.0, 1.0, 1, 100.0, 900.0, 0.0
-2, '1', 40.0, 10.0, 100.0, -100.0, 1.0, 0, 100.0, 0.0, 0.2, 0.0, 0.0, 1.0, 1, 100.0, 90.0, 0.0
-0 / END OF GENERATOR DATA, BEGIN BRANCH DATA
-1, 2, '1', 0.01, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1
-0 / END OF BRANCH DATA, BEGIN TRANSFORMER DATA
-0 / END OF TRANSFORMER DATA
-Q
-"""
-MACHINES = "1 'GENCLS' 1 0 0 /\n2 'GENCLS' 1 4 2 /\n"
 LINE = 0.01 + 0.1j
 STIFF, PLANT = 0.02j, 0.2j  # reactances of the machines on 100 MVA
 FAULT = 0.1j
@@ -51,18 +31,7 @@ def prepared(tmp_path):
     """Records of relays, events, and a stop [s] → the scenario of the case that gfor writes."""
 
     def made(records, events=(), stop=2.0, units=""):
-        (tmp_path / "mill.raw").write_text(RAW)
-        (tmp_path / "mill.dyr").write_text(MACHINES + "".join(f"{text} /\n" for text in records))
-        out = tmp_path / "case.toml"
-        files = (tmp_path / "mill.raw", tmp_path / "mill.dyr")
-        text = write_case(WantedCase(files, out, models="phasor")).text
-        text = text.replace('dyr = "mill.dyr"', f'{units}\ndyr = "mill.dyr"')
-        text = text.replace('"grid.line_*.p"', '"grid.line_*.p", "grid.sg2.p"')
-        tables = "".join(
-            "[[scenarios.tried.events]]\n" + "".join(f"{k} = {v!r}\n" for k, v in e.items())
-            for e in events
-        )
-        out.write_text(f"{text}\n[scenarios.tried]\ntitle = 'tried'\n{tables}", encoding="utf-8")
+        out = mill_case(tmp_path, records, events, units)
         return prepare_one(out, "tried" if events else "base", {}, None, stop)
 
     return made
