@@ -5,6 +5,7 @@ of states alone."""
 
 from dataclasses import dataclass
 
+from fmus.toolchain.blocks import low_pass
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import MasterStep
@@ -13,6 +14,12 @@ from fmus.toolchain.symbols import Expr, exp, fmax
 
 # communication step in parts of the lags below which their delays are those of none: 2e-7 from τ
 SHORT = 1e-3
+
+LEAST_VOLTAGE = 0.01
+"""Voltage [pu] below which no division by it takes place: the WECC's diagrams' own figure."""
+
+LEAST_SQUARE = LEAST_VOLTAGE**2
+"""Square of a voltage [pu²] below which its turning is no frequency."""
 
 
 @dataclass(frozen=True)
@@ -80,3 +87,11 @@ def extrapolated_voltage(
     return ExtrapolatedVoltage(
         once, twice, tau, tau * ratio / 2 * (growth + 1) / (growth - 1), more
     )
+
+
+def frequency_of(m: ModelBuilder, seen: ExtrapolatedVoltage, omega_b: Expr, T: Expr) -> Expr:
+    """Declare a filter of the bus voltage's frequency; return that frequency [pu], from states alone."""
+    v = seen.twice
+    turning = (v.conjugate() * ((seen.once - v) / seen.tau)).im
+    square = fmax(v.re**2 + v.im**2, LEAST_SQUARE)
+    return low_pass(m, "frequency", 1 + turning / square / omega_b, T, 1.0)

@@ -14,12 +14,12 @@ Source: WECC's specification of DER_A (P. Pourbeik, 2019)."""
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from fmus.converter_parts.bus_voltage import LEAST_VOLTAGE
 from fmus.synchronous_generator.data_lines import Given, declared, number, power, pu, seconds
 from fmus.toolchain.blocks import BYPASS_TIME, clamp, held_at_limits, low_pass_or_nothing
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, fabs, fmax, fmin, if_else, sqrt
 from fmus.wecc_renewable.signals import (
-    LEAST_VOLTAGE,
     ROUNDING,
     Controller,
     controlled,

@@ -5,7 +5,12 @@ that this current gives behind a reactance of the port, with an extrapolated ter
 
 from math import pi
 
-from fmus.converter_parts.bus_voltage import ExtrapolatedVoltage, extrapolated_voltage
+from fmus.converter_parts.bus_voltage import (
+    ExtrapolatedVoltage,
+    extrapolated_voltage,
+    frequency_of,
+)
+from fmus.converter_parts.current_at_angle import emf_of_current, port_of_current
 from fmus.distributed_generation.control import (
     Seen,
     commands,
@@ -19,20 +24,16 @@ from fmus.toolchain.frames import Phasor, power
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import (
-    SourceEmf,
     declare_master_step,
     declare_phasor_outputs,
-    motion,
     phasor_builder,
 )
 from fmus.toolchain.port import DevicePort, device_port
-from fmus.toolchain.symbols import Expr, fmax, if_else
-from fmus.wecc_renewable.signals import LEAST_VOLTAGE
+from fmus.toolchain.symbols import Expr, if_else
 
 S_N = 100.0  # default rating [MVA]: the base of networks
 P_0 = 0.8  # default power [pu, S_n]
 UNLIMITED = 1e4  # rate [pu/s] that is none
-LEAST_SQUARE = 1e-4  # of the voltage [pu²] below which its turning is no frequency
 
 
 def dera1_phasor() -> Model:
@@ -40,25 +41,13 @@ def dera1_phasor() -> Model:
     title = "Distributed generation of WECC's DER_A (phasor type)"
     m = phasor_builder("dera1_phasor", title, kind="converter")
     port = device_port(m, S_n=S_N, P_0=P_0)
-    text = (
-        "Reactance of the port, across which the current is fed; it changes nothing in steady state"
-    )
-    X = m.parameter("X_port", 2.0, "pu", text, base="S_n", minimum=0.01, source="chosen here")
-    R = m.parameter("R_port", 0.0, "pu", "Resistance of the port", base="S_n", minimum=0.0)
-    Z = Phasor(R, X)
+    Z = port_of_current(m)
     master = declare_master_step(m)
     seen = extrapolated_voltage(m, port, master)
     seen.follow(m, port.v)
     fed = _declare_current(m, port, seen)
     at_start = power(port.v_0, port.i_0) / port.v_0.magnitude()
-    with m.scope("source"):
-        moving = motion(m, "i", fed, at_start.conjugate(), "Current at the voltage's angle")
-
-    def emf(time: Expr) -> Phasor:
-        v = seen.after(time)
-        return v + Z * _turned(fed + moving * time, v)
-
-    source = SourceEmf(behind=emf(-master.size / 2), ahead=emf(master.to_next))
+    source = emf_of_current(m, seen, Z, fed, at_start.conjugate(), master)
     declare_phasor_outputs(m, port, source, Z)
     m.output("V", seen.value.magnitude(), "pu", "Voltage magnitude at the terminal", base="bus")
     m.output("I_p_fed", fed.re, "pu", "Active current", base="S_n")
@@ -76,7 +65,7 @@ def _declare_current(m: ModelBuilder, port: DevicePort, seen: ExtrapolatedVoltag
         m.parameter(f"delta_{name}", 0, "pu", f"Change of {name}", base="S_n", tunable=True)
         for name in ("Pref", "Qref")
     )
-    frequency = _frequency(m, seen, port.omega_b, p.Trf)
+    frequency = frequency_of(m, seen, port.omega_b, p.Trf)
     active = m.state("I_p", active_0, "pu", "Active current behind its lag", base="S_n")
     reactive = m.state("I_q", reactive_0, "pu", "Reactive current behind its lag", base="S_n")
     P = v * active * port.connected
@@ -112,16 +101,3 @@ def _follow(
     down = if_else(x >= 0, -UNLIMITED, -p.rrpwr)
     m.derivative(x, clamp(rate, down, up))
     m.derivative(reactive[0], (reactive[1] - reactive[0]) / p.Tg)
-
-
-def _turned(current: Phasor, v: Phasor) -> Phasor:
-    """A current at a voltage's angle, in the network frame."""
-    return current * v / fmax(v.magnitude(), LEAST_VOLTAGE)
-
-
-def _frequency(m: ModelBuilder, seen: ExtrapolatedVoltage, omega_b: Expr, T: Expr) -> Expr:
-    """Frequency of the bus voltage behind a filter [pu], from states alone."""
-    v = seen.twice
-    turning = (v.conjugate() * ((seen.once - v) / seen.tau)).im
-    square = fmax(v.re**2 + v.im**2, LEAST_SQUARE)
-    return low_pass(m, "frequency", 1 + turning / square / omega_b, T, 1.0)

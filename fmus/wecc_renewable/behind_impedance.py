@@ -15,7 +15,7 @@ InterPSS describe them."""
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from fmus.converter_parts.bus_voltage import ExtrapolatedVoltage
+from fmus.converter_parts.bus_voltage import LEAST_VOLTAGE, ExtrapolatedVoltage
 from fmus.synchronous_generator.data_lines import Line, declared, number, power, seconds
 from fmus.toolchain.blocks import BYPASS_TIME, clamp, low_pass_or_nothing
 from fmus.toolchain.frames import Phasor, polar
@@ -26,7 +26,7 @@ from fmus.toolchain.port import DevicePort
 from fmus.toolchain.symbols import Expr, fmax, if_else, logic_and, logic_or, sqrt
 from fmus.wecc_renewable.converters import Converter, Kind
 from fmus.wecc_renewable.injection import UNLIMITED
-from fmus.wecc_renewable.signals import LEAST_VOLTAGE, ROUNDING, Controller, controlled
+from fmus.wecc_renewable.signals import ROUNDING, Controller, controlled
 
 SOURCE = "example of GridPACK, four converters in Kundur's two areas"
 CHOSEN = "chosen here"

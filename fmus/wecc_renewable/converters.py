@@ -5,13 +5,13 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from fmus.converter_parts.bus_voltage import ExtrapolatedVoltage
+from fmus.converter_parts.current_at_angle import at_angle_of, emf_of_current, port_of_current
 from fmus.toolchain.frames import Phasor, power
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.phasor_port import MasterStep, SourceEmf, motion
+from fmus.toolchain.phasor_port import MasterStep, SourceEmf
 from fmus.toolchain.port import DevicePort
 from fmus.toolchain.symbols import Expr
 from fmus.wecc_renewable.injection import Injection, declare_injection
-from fmus.wecc_renewable.signals import turned
 
 
 class Converter(ABC):
@@ -44,16 +44,6 @@ class Kind(NamedTuple):
     converter: Callable[[ModelBuilder, DevicePort, ExtrapolatedVoltage, Phasor], Converter]
 
 
-def port_of_current(m: ModelBuilder) -> Phasor:
-    """Declare the impedance across which a current is fed."""
-    text = (
-        "Reactance of the port, across which the current is fed; it changes nothing in steady state"
-    )
-    X = m.parameter("X_port", 2.0, "pu", text, base="S_n", minimum=0.01, source="chosen here")
-    R = m.parameter("R_port", 0.0, "pu", "Resistance of the port", base="S_n", minimum=0.0)
-    return Phasor(R, X)
-
-
 class Regca1(Converter):
     """REGCA1: a current at the angle of the terminal voltage."""
 
@@ -69,7 +59,7 @@ class Regca1(Converter):
         )
         self.active_0, self.reactive_0 = self._injection.active_0, self._injection.reactive_0
         self._fed = Phasor(self._injection.active, -self._injection.reactive)
-        self.current = turned(self._fed, seen.value) * port.connected
+        self.current = at_angle_of(seen.value, self._fed) * port.connected
 
     def follow(self, m: ModelBuilder, active: Expr, reactive: Expr) -> None:
         """Let the currents follow their commands [pu, S_n]."""
@@ -77,15 +67,8 @@ class Regca1(Converter):
 
     def emf(self, m: ModelBuilder, master: MasterStep) -> SourceEmf:
         """Return the emf across the port that gives the current."""
-        with m.scope("source"):
-            start = self._at_start.conjugate()
-            moving = motion(m, "i", self._fed, start, "Current at the voltage's angle")
-
-        def emf(time: Expr) -> Phasor:
-            v = self._seen.after(time)
-            return v + self._Z * turned(self._fed + moving * time, v)
-
-        return SourceEmf(behind=emf(-master.size / 2), ahead=emf(master.to_next))
+        start = self._at_start.conjugate()
+        return emf_of_current(m, self._seen, self._Z, self._fed, start, master)
 
     def fed(self) -> tuple[Expr, Expr]:
         """Active and reactive current that it feeds [pu, S_n]."""

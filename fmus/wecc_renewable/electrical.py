@@ -19,6 +19,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+from fmus.converter_parts.bus_voltage import LEAST_VOLTAGE
 from fmus.synchronous_generator.data_lines import Given, Line, declared, number, power, pu, seconds
 from fmus.toolchain.blocks import (
     BYPASS_TIME,
@@ -40,7 +41,6 @@ from fmus.toolchain.symbols import (
     sqrt,
 )
 from fmus.wecc_renewable.signals import (
-    LEAST_VOLTAGE,
     ROUNDING,
     SOURCE,
     Controller,

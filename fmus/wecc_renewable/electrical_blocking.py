@@ -12,6 +12,7 @@ Source: WECC's specification of REEC_D (EPRI, 2019), as PowerWorld's help, Dynaw
 from collections.abc import Mapping
 from typing import ClassVar
 
+from fmus.converter_parts.bus_voltage import LEAST_VOLTAGE
 from fmus.synchronous_generator.data_lines import Given, number, power, pu, seconds
 from fmus.toolchain.blocks import RETURN_TIME, clamp, low_pass_or_nothing
 from fmus.toolchain.frames import Phasor
@@ -30,7 +31,7 @@ from fmus.wecc_renewable.electrical import (
     held_limit,
     table_lines,
 )
-from fmus.wecc_renewable.signals import LEAST_VOLTAGE, ROUNDING, Terminal, still_after
+from fmus.wecc_renewable.signals import ROUNDING, Terminal, still_after
 
 POINTS_OF_D = 10
 """Points of each table VDL of REECD1."""

@@ -14,7 +14,7 @@ Source: WECC's specification of REPC_A (EPRI, 2013), and its "Solar Plant Dynami
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from fmus.converter_parts.bus_voltage import ExtrapolatedVoltage
+from fmus.converter_parts.bus_voltage import LEAST_VOLTAGE, ExtrapolatedVoltage, frequency_of
 from fmus.synchronous_generator.data_lines import Given, declared, number, power, pu, seconds
 from fmus.toolchain.blocks import clamp, lead_lag, low_pass, low_pass_or_nothing
 from fmus.toolchain.frames import Phasor
@@ -22,7 +22,6 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port_variables import SYSTEM_BASE
 from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else
 from fmus.wecc_renewable.signals import (
-    LEAST_VOLTAGE,
     ROUNDING,
     SOURCE,
     Controller,
@@ -109,9 +108,6 @@ def measured_elsewhere(m: ModelBuilder, current_scale: Expr) -> Measured:
     return Measured(v, P, Q, v_0, P_0, Q_0, has_inputs=True)
 
 
-_LEAST_SQUARE = 1e-4  # of a voltage [pu²], below which no frequency is told from it
-
-
 def plant_references(
     m: ModelBuilder, t: Measured, seen: ExtrapolatedVoltage, omega_b: Expr, start: References
 ) -> References:
@@ -138,7 +134,7 @@ def plant_references(
     reactive = lead_lag(m, "lead_lag", of_voltage, p.Tft, p.Tfv, start.Q)
 
     measured = t.filter(m, "P_filtered", t.P, p.Tp, initial=t.P_0)
-    away = 1 - _frequency(m, seen, omega_b, p.T_f)
+    away = 1 - frequency_of(m, seen, omega_b, p.T_f)
     beyond = dead_band(away, p.fdbd1, p.fdbd2)
     droop = p.Dup * fmax(beyond, 0) + p.Ddn * fmin(beyond, 0)
     power_error = clamp(t.P_0 + change_P - measured + droop, p.femin, p.femax)
@@ -165,11 +161,3 @@ def _regulated(p: Given, compensates: Expr, v: Expr, P: Scalar, Q: Scalar) -> Ex
     current = Phasor(P, -Q) / fmax(v, LEAST_VOLTAGE)  # in the frame of v
     inside = (Phasor(v, 0.0) - Phasor(p.Rc, p.Xc) * current).magnitude()
     return if_else(compensates, inside, v + p.Kc * Q)
-
-
-def _frequency(m: ModelBuilder, seen: ExtrapolatedVoltage, omega_b: Expr, T: Expr) -> Expr:
-    """Frequency of the bus voltage behind a filter [pu], from states alone."""
-    v = seen.twice
-    turning = (v.conjugate() * ((seen.once - v) / seen.tau)).im
-    square = fmax(v.re**2 + v.im**2, _LEAST_SQUARE)
-    return low_pass(m, "frequency", 1 + turning / square / omega_b, T, 1.0)

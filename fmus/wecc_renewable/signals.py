@@ -13,9 +13,6 @@ from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and,
 SOURCE = "NREL's reduced WECC system of 240 buses (2018), plant at bus 1032"
 """Where the defaults are from: its plants have the same values nearly everywhere."""
 
-LEAST_VOLTAGE = 0.01
-"""Voltage [pu] below which no division by it takes place: the diagrams' own figure."""
-
 ROUNDING = 1e-4
 """Part of a limit by which a file's figures may exceed it at the operating point: they have four to five digits."""
 
@@ -44,11 +41,6 @@ class References:
 
     P: Expr
     Q: Expr
-
-
-def turned(current: Phasor, v: Phasor) -> Phasor:
-    """A current at a voltage's angle, in the network frame."""
-    return current * v / fmax(v.magnitude(), LEAST_VOLTAGE)
 
 
 def dead_band(u: Expr, low: Scalar, high: Scalar) -> Expr:
