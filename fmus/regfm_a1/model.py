@@ -2,13 +2,19 @@
 
 Names of parameters and signals are those of the specification (PNNL-32278, September 2023)."""
 
+from fmus.converter_parts.fault_current import (
+    FaultLimit,
+    declare_seen_lag,
+    declare_terminal_outputs,
+    limited_in_faults,
+)
 from fmus.toolchain.blocks import low_pass
 from fmus.toolchain.frames import Phasor, power
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import declare_phasor_outputs, phasor_builder, source_emf
 from fmus.toolchain.port import DevicePort, device_port
-from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and, logic_or, sqrt
+from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and, logic_or
 from fmus.toolchain.variables import usual_beside
 
 SPECIFICATION = "PNNL-32278 (2023), as GridKit's REGFMA quotes it"
@@ -218,7 +224,8 @@ def regfm_a1_phasor() -> Model:
         m, port.v_0.magnitude(), e_0.magnitude(), power(port.v_0, port.i_0).im, Qf, Vf
     )
     inside = Phasor(E_droop, 0)
-    limited, share = _limited(m, port, inside, v, Z, e_0)
+    at_rest = port.v_0.rotated(-e_0.angle())
+    limited, share = limited_in_faults(m, _fault_limit(m, port), inside, v, Z, at_rest)
 
     i = (limited - v) / Z * port.connected
     s = power(v, i)
@@ -236,14 +243,7 @@ def regfm_a1_phasor() -> Model:
         "Magnitude of the internal voltage before the fault current limit",
         base="S_n",
     )
-    m.output("V", v.magnitude(), "pu", "Voltage magnitude at the terminal", base="bus")
-    m.output("I", i.magnitude(), "pu", "Magnitude of the current", base="S_n")
-    m.output(
-        "fault_current",
-        share,
-        "1",
-        "Current without the fault current limit, in parts of it; above 1 it acts",
-    )
+    declare_terminal_outputs(m, v, i, share)
     return m.build()
 
 
@@ -267,13 +267,7 @@ def _declare_measurement(
     return found[0], found[1], found[2]
 
 
-def _limited(
-    m: ModelBuilder, port: DevicePort, inside: Phasor, v: Phasor, Z: Phasor, e_0: Phasor
-) -> tuple[Phasor, Expr]:
-    """The internal voltage that keeps the current within ImaxF, and the current without it in parts of ImaxF.
-
-    The specification takes the terminal voltage of the same instant. A port whose emf follows from states alone needs a
-    measured one: while the limit acts, the current is limited after that lag."""
+def _fault_limit(m: ModelBuilder, port: DevicePort) -> FaultLimit:
     ImaxF = m.parameter(
         "ImaxF",
         2.0,
@@ -283,25 +277,9 @@ def _limited(
         minimum=0.1,
         source=SPECIFICATION,
     )
-    T = m.parameter(
-        "TIf",
-        0.002,
-        "s",
-        "Lag of the terminal voltage that the fault current limit sees",
-        minimum=1e-3,
-        source="chosen here; none in the specification",
-    )
+    lag = declare_seen_lag(m, "TIf")
     m.require(
         ImaxF - port.i_0.magnitude(),
         "the power flow asks for more current than ImaxF: lower P_0, or raise S_n",
     )
-    start = port.v_0.rotated(-e_0.angle())
-    seen = Phasor(
-        low_pass(m, "V_seen_re", Expr(v.re), T, start.re),
-        low_pass(m, "V_seen_im", Expr(v.im), T, start.im),
-    )
-    current = (inside - seen) / Z
-    square = (current.re**2 + current.im**2) / ImaxF**2
-    scale = 1 / sqrt(fmax(1, square))
-    # Exactly the internal voltage where the limit does not act.
-    return inside + Z * current * (scale - 1), sqrt(square)
+    return FaultLimit(ImaxF, lag)

@@ -17,6 +17,12 @@ those of a public script of PNNL's for PSS/E 36.4."""
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from fmus.converter_parts.fault_current import (
+    FaultLimit,
+    declare_seen_lag,
+    declare_terminal_outputs,
+    limited_in_faults,
+)
 from fmus.synchronous_generator.data_lines import Given, declared, number, power, seconds
 from fmus.toolchain.blocks import clamp, held_at_limits, low_pass
 from fmus.toolchain.frames import Phasor
@@ -134,7 +140,9 @@ def regfm_b1_phasor() -> Model:
 
     delta = pll + inner
     v = port.v.rotated(-delta)
-    limited, share = _fault_limited(m, p.ImaxF, Phasor(E, 0.0), v, Z, start)
+    limit = FaultLimit(p.ImaxF, declare_seen_lag(m, "T_seen"))
+    at_rest = Phasor(start.V, 0.0).rotated(-start.angle)
+    limited, share = limited_in_faults(m, limit, Phasor(E, 0.0), v, Z, at_rest)
     i = (limited - v) / Z * port.connected
     s, in_pll = power_of(v, i), i.rotated(inner)
     m.close(P, s.re)
@@ -145,14 +153,7 @@ def regfm_b1_phasor() -> Model:
     declare_phasor_outputs(m, port, emf, Z)
     m.output("omega", 1 + w, "pu", "Speed of the virtual machine", base="f_n")
     m.output("E_inner", E, "pu", "Inner voltage before the fault current limit", base="S_n")
-    m.output("V", v.magnitude(), "pu", "Voltage magnitude at the terminal", base="bus")
-    m.output("I", i.magnitude(), "pu", "Magnitude of the current", base="S_n")
-    m.output(
-        "fault_current",
-        share,
-        "1",
-        "Current without the fault current limit, in parts of it; above 1 it acts",
-    )
+    declare_terminal_outputs(m, v, i, share)
     return m.build()
 
 
@@ -267,30 +268,6 @@ def _inner_voltage(
     x = m.state("x_V", start.E, "pu", "Integrator of the voltage control", base="S_n")
     m.derivative(x, held_at_limits(x, p.kiv * error, low, high))
     return clamp(p.kpv * error + x, low, high)
-
-
-def _fault_limited(
-    m: ModelBuilder, most: Expr, inner: Phasor, v: Phasor, Z: Phasor, start: _Start
-) -> tuple[Phasor, Expr]:
-    """The inner voltage that keeps the current within ImaxF, and the current without it in parts of ImaxF."""
-    T = m.parameter(
-        "T_seen",
-        0.002,
-        "s",
-        "Lag of the terminal voltage that the fault current limit sees",
-        minimum=1e-3,
-        source="chosen here; none in the specification",
-    )
-    at_rest = Phasor(start.V, 0.0).rotated(-start.angle)
-    seen = Phasor(
-        low_pass(m, "V_seen_re", Expr(v.re), T, at_rest.re),
-        low_pass(m, "V_seen_im", Expr(v.im), T, at_rest.im),
-    )
-    current = (inner - seen) / Z
-    square = (current.re**2 + current.im**2) / most**2
-    scale = 1 / sqrt(fmax(1, square))
-    # exactly the inner voltage where the limit does not act
-    return inner + Z * current * (scale - 1), sqrt(square)
 
 
 def _require_within(
