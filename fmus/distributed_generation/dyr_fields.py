@@ -1,4 +1,4 @@
-"""Records of distributed generation in a PSS/E dynamics file (DYR) → parameters of `dera1_phasor`."""
+"""Records of distributed generation in a PSS/E dynamics file (DYR) → parameters of `dera1_phasor` and `pvd1_phasor`."""
 
 from fmus.synchronous_generator.dyr_fields import records_beside
 

@@ -10,6 +10,7 @@ Both shares are multiplied, and go through 1/(1 + s·Tv).
 
 Source: WECC's specification of DER_A (P. Pourbeik, 2019)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from fmus.synchronous_generator.data_lines import Given
@@ -56,14 +57,33 @@ def _of_voltage(m: ModelBuilder, side: _Side, returning: Expr) -> Expr:
     with m.scope(f"trip_{side.name}"):
         inner = _time(m, "inner", side.is_inner)
         outer = _time(m, "outer", side.is_outer)
-        lost = m.state("lost", 0.0, "1", "Share lost after its time, of which Vrfrac comes back")
         late = logic_and(side.is_inner, inner >= side.inner_time)
         all_late = logic_and(side.is_outer, outer >= side.outer_time)
-        target = if_else(all_late, 1, if_else(late, fmax(lost, lost_now), lost))
-        resting = logic_and(lost < FORGOTTEN, 1 - logic_or(late, all_late))
-        m.derivative(lost, if_else(resting, -lost / BYPASS_TIME, (target - lost) / RETURN_TIME))
+
+        def target(lost: Expr) -> Expr:
+            return if_else(all_late, 1, if_else(late, fmax(lost, lost_now), lost))
+
+        return kept_share(m, lost_now, returning, target, acts=logic_or(late, all_late))
+
+
+def kept_share(
+    m: ModelBuilder,
+    lost_now: Expr,
+    returning: Expr,
+    target: Callable[[Expr], Expr],
+    *,
+    acts: Expr,
+) -> Expr:
+    """Declare the memory of what was lost; return the share that is left.
+
+    ``lost_now``: share that is off at this value of voltage or frequency; ``returning``: part of the lost that comes
+    back with it; ``target``: what the memory goes to, from what it has; ``acts``: whether anything is being lost."""
+    lost = m.state("lost", 0.0, "1", "Share lost after its time, of which a part comes back")
+    resting = logic_and(lost < FORGOTTEN, 1 - acts)
+    goes = (target(lost) - lost) / RETURN_TIME
+    m.derivative(lost, if_else(resting, -lost / BYPASS_TIME, goes))
     held = if_else(lost < FORGOTTEN, 0, fmin(lost, 1))
-    back = fmax(held - lost_now, 0)  # of the lost, what the voltage would let back
+    back = fmax(held - lost_now, 0)  # of the lost, what would be back
     return 1 - fmax(lost_now, held) + returning * back
 
 

@@ -54,6 +54,9 @@ class Given:
     def __init__(self, values: dict[str, Expr]) -> None:
         self._values = values
 
+    def __or__(self, others: "Given") -> "Given":
+        return Given(self._values | others._values)
+
     def has(self, name: str) -> bool:
         """Return whether there is such a parameter."""
         return name in self._values

@@ -135,6 +135,13 @@ REFERENCES = (
         ("i_re", "i_im", "e_re", "e_im", "I_p_fed", "I_q_fed", "share"),
     ),
     Reference(
+        "pvd1_phasor",
+        "fmus/distributed_generation/reference_pvd1.csv",
+        {"P_0": 0.8, "Q_0": 0.05, "V0": 0.999, "V1": 1.001, "Dqdv": 5.0},
+        *_BUS,
+        ("i_re", "i_im", "e_re", "e_im", "I_p_fed", "I_q_fed", "share"),
+    ),
+    Reference(
         "induction_motor_phasor",
         "fmus/induction_machine/reference.csv",
         {"P_0": -0.8, "Q_0": -0.35, "R2": 0.05, "X2": 0.1, "E": 2.0},

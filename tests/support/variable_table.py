@@ -31,6 +31,7 @@ LEAFLETS = {
     "regfm_b1_phasor": ROOT / "fmus" / "regfm_b1" / "README.md",
     "csvgn1_phasor": ROOT / "fmus" / "static_var" / "README.md",
     "dera1_phasor": ROOT / "fmus" / "distributed_generation" / "README.md",
+    "pvd1_phasor": ROOT / "fmus" / "distributed_generation" / "README.md",
     "induction_generator_phasor": ROOT / "fmus" / "induction_machine" / "README.md",
     "induction_motor_phasor": ROOT / "fmus" / "induction_machine" / "README.md",
     "regca1_phasor": ROOT / "fmus" / "wecc_renewable" / "README.md",

@@ -80,6 +80,17 @@ ALL_PATHS_OPEN = {
         "dbd1": 0.0,
         "dbd2": 0.0,
     },
+    "pvd1_phasor": {
+        "communication_step": 5e-3,
+        "R_port": 0.01,
+        "V0": 1.0,
+        "V1": 1.0,
+        "Xc": 0.05,
+        "fdbd": 0.0,
+        "Ddn": 2.0,
+        **{"Vt0": 0.5, "Vt1": 0.9999, "Vt2": 1.0001, "Vt3": 1.5},
+        **{"Ft0": 0.0, "Ft1": 49.999, "Ft2": 50.001, "Ft3": 500.0},
+    },
     "regca1_phasor": _PLANT_OPEN,
     "wecc_plant_phasor": {"communication_step": 5e-3, "Re": 0.01},
     "regca1_repca1_phasor": _PLANT_OPEN,
@@ -115,6 +126,7 @@ BEHIND_THRESHOLDS = {name: {"pll.freezing.awake"} for name in ("gfl_l2ep", "gfl_
     "regfm_b1_phasor": {"delta_ITmax", "delta_ITmin", "Idf", "Qf"},  # at limits, and by VdrpFlag
     "csvgn1_phasor": {"first", "second"},  # T5 = 0 leaves out the lag between them and the outputs
     "induction_motor_phasor": {"relay.latch", "relay.opening"},
+    "pvd1_phasor": {"trip_high_frequency.lost"},  # a share below 1 % is forgotten
 }
 # Blocks of the generators and the POD that the literature lets one leave out with a time constant of zero.
 LEFT_OUT = {

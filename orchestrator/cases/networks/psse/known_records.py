@@ -25,7 +25,10 @@ _LIBRARY = "PSS/E's model library as PowerWorld's and NEPLAN's guides and ANDES'
 _REGFM = "WECC's specification of REGFM_A1"
 _REGFM_B1 = "WECC's specification of REGFM_B1, in PNNL's script for PSS/E"
 _LOADS = "GridPACK's reader and model"
-_DISTRIBUTED = "WECC's specification of DER_A; fields as PowerSystems.jl lists PSS/E's"
+_DISTRIBUTED = {
+    "DERA1": "WECC's specification of DER_A; fields as PowerSystems.jl lists PSS/E's",
+    "PVD1": "WECC's PVD1 as PowerWorld's help and ANDES have it; fields as Argonne's DYN reads them",
+}
 _INDUCTION = "PowerWorld's guide to PSS/E's machine models"
 _FREQUENCY = "PowerWorld's guide to PSS/E's load models"
 _RELAYS = "PowerWorld's guide to PSS/E's relay models; fields as InterPSS and GridPACK read them"
@@ -96,7 +99,7 @@ def known_records() -> list[KnownRecord]:
         for name, record in PLANT_RECORDS.items()
     ]
     found += [
-        KnownRecord(name, "converter", record.part, _DISTRIBUTED, "; ".join(_limits(record)))
+        KnownRecord(name, "converter", record.part, _DISTRIBUTED[name], "; ".join(_limits(record)))
         for name, record in DISTRIBUTED_RECORDS.items()
     ]
     found += [
