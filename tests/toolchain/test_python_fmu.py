@@ -89,6 +89,7 @@ ALL_PATHS_OPEN = {
         "fdbd": 0.0,
         "Ddn": 2.0,
         **{"Vt0": 0.5, "Vt1": 0.9999, "Vt2": 1.0001, "Vt3": 1.5},
+        **{"lvpnt0": 0.2, "lvpnt1": 1.0, "Vtmax": 0.7, "Khv": 2.0},
         **{"Ft0": 0.0, "Ft1": 49.999, "Ft2": 50.001, "Ft3": 500.0},
     },
     "regca1_phasor": _PLANT_OPEN,
