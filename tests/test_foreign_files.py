@@ -271,7 +271,7 @@ def test_a_name_has_one_line():
 def test_what_a_networks_source_calls_its_elements_is_shown_in_one_line():
     changes = Changes("grid.zip", "element")
     changes.note("L1\nUNSTABLE\x1b[2K", "held")
-    (problem,) = changes.listed()
+    (problem,) = changes.as_problems()
     assert str(problem) == "grid.zip, element L1\\nUNSTABLE\\x1b[2K: held"
 
 
@@ -280,7 +280,7 @@ def test_changes_are_of_one_kind_by_what_is_said_of_them_and_not_by_their_figure
     for line, power in ((4, 1.5), (7, 20.0)):
         changes.note(line, Remark(f"draws GL = {power:g} MW at 'B{line}'", "a shunt that draws"))
     changes.note(9, "IDE = 3: held at its own voltage, as 'B9' is")
-    kinds = [problem.topic.kind for problem in changes.listed()]
+    kinds = [problem.topic.kind for problem in changes.as_problems()]
     assert kinds == ["a shunt that draws"] * 2 + ["IDE = 3: held at its own voltage, as 'B9' is"]
     assert pickle.loads(pickle.dumps(Remark("x 5", "x"))).kind == "x"
 

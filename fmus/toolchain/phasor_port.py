@@ -103,10 +103,10 @@ def source_emf(m: ModelBuilder, emf: Phasor, start: Phasor, angle: Expr, rate: E
     with m.scope("source"):
         change = motion(m, "e", emf, start, "Emf")
 
-    def moved(time: Expr) -> Phasor:
+    def emf_after(time: Expr) -> Phasor:
         return (emf + change * time).rotated(angle + rate * time)
 
-    return SourceEmf(behind=moved(-master.size / 2), ahead=moved(master.to_next))
+    return SourceEmf(behind=emf_after(-master.size / 2), ahead=emf_after(master.to_next))
 
 
 def declare_phasor_outputs(

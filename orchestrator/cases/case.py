@@ -133,7 +133,9 @@ class Case(CaseDefinition):
             if follow and before is not None and before.power_flow is not None:
                 preparer.draft.voltages_before = before.power_flow.voltages
                 preparer.draft.loads_as_given = self._loads_as_given(before, overrides or {})
-            prepared.append(_told(preparer.prepare(step_size, stop_time), lost, shared))
+            prepared.append(
+                _with_feeders_of_loss(preparer.prepare(step_size, stop_time), lost, shared)
+            )
             named.add(preparer.draft)
             problems += [p for p in preparer.problems if p not in problems]
             questions += [q for q in preparer.draft.found.questions if q not in questions]
@@ -327,10 +329,11 @@ class Case(CaseDefinition):
     ) -> dict[str, ComponentPlan]:
         """Components of one scenario with their values; much cheaper than to prepare it."""
         return {
-            name: plan for name, (_, plan) in self.placed(scenario, overrides, parameters).items()
+            name: plan
+            for name, (_, plan) in self.tables_and_plans(scenario, overrides, parameters).items()
         }
 
-    def placed(
+    def tables_and_plans(
         self,
         scenario: str,
         overrides: Mapping[str, Value] | None = None,
@@ -367,7 +370,7 @@ _NAMED = 2  # values set that a title names; the others are counted
 _FED = 1e-6  # power of a unit from which its loss is told [pu]
 
 
-def _told(
+def _with_feeders_of_loss(
     prepared: PreparedScenario | None, lost: Collection[str], dispatch: Dispatch | None
 ) -> PreparedScenario | None:
     """The scenario, which says of units that values took out of service who feeds their power."""

@@ -43,7 +43,7 @@ def few(texts: Iterable[str], most: int, between: str = ", ") -> str:
     return between.join(texts[:most]) + more
 
 
-def counted(number: int, what: str) -> str:
+def number_of(number: int, what: str) -> str:
     """``3 points``."""
     if number == 1:
         return f"{number} {what}"
@@ -247,8 +247,8 @@ class CaseError(InputError):
         self.problems = tuple(problems)
         kinds = {problem.kind for problem in problems}
         asked = sum(problem.besides for problem in problems)
-        count = counted(len(problems) - asked, "problem")
-        count += f", and {counted(asked, 'question')} besides" if asked else ""
+        count = number_of(len(problems) - asked, "problem")
+        count += f", and {number_of(asked, 'question')} besides" if asked else ""
         lines = joined(
             "\n  - ",
             [f"{ShownFile.of(source)}: {count}", *(problem.message for problem in problems)],

@@ -297,7 +297,7 @@ def _two_area() -> tuple[object, Elements]:
 
 def _read_case(path: Path) -> None:
     case = load_case(path)
-    case.placed(next(iter(case.scenarios)))
+    case.tables_and_plans(next(iter(case.scenarios)))
 
 
 def _read_ssd(path: Path) -> None:

@@ -90,7 +90,7 @@ def st1a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         def relieved(field_current: Expr) -> Expr:
             return K_LR * fmax(field_current - I_LR, 0)
 
-        def held(signal: Expr, v_t: Expr) -> Expr:
+        def between_ceilings(signal: Expr, v_t: Expr) -> Expr:
             floor = v_t * low
             return clamp(signal, floor, fmax(v_t * high - K_C * seen.I_fd, floor))
 
@@ -114,7 +114,7 @@ def st1a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         error = lead_lag_stage(m, error, V_I0, mark="1")
         V_A = close_limited_low_pass(m, amplifier, K_A * error, T_A, A_low, A_high)
         V_X = V_A - relieved(seen.I_fd)
-        E_fd = held(V_X, seen.terminal_voltage(held(V_X, measured.nearly)))
+        E_fd = between_ceilings(V_X, seen.terminal_voltage(between_ceilings(V_X, measured.nearly)))
         return measured.close(E_fd)
 
 

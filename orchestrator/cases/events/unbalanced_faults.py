@@ -18,7 +18,7 @@ from orchestrator.cases.events.sequence_networks import FAULT, Changed, Sequence
 from orchestrator.cases.flow.power_flow import PowerFlow
 from orchestrator.cases.flow.solved_fault import SolvedFault
 from orchestrator.cases.networks import sequence_data as usual
-from orchestrator.core.errors import InputError, Problem, QuestionTopic, counted, few
+from orchestrator.core.errors import InputError, Problem, QuestionTopic, few, number_of
 from orchestrator.systems.coupling import events as coupled
 from orchestrator.systems.coupling.events import Event, FaultKind
 
@@ -225,7 +225,7 @@ class _Solver:
                 continue
             said = _EXAMPLES[key].format(names[0])
             text = (
-                f"{_ASSUMED[key]} ({counted(len(names), 'element')}: {few(names, _SHOWN)}); if it is another, give "
+                f"{_ASSUMED[key]} ({number_of(len(names), 'element')}: {few(names, _SHOWN)}); if it is another, give "
                 f"a SEQ file, or write [network.sequences] {said}"
             )
             yield Problem(self._where, text, topic=QuestionTopic(f"sequence data: {key}"))

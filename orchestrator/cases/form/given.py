@@ -106,10 +106,10 @@ def _keys(values: Mapping[Any, Any]) -> Iterable[Any]:
 
 def binding_path(given: Any) -> Path | None:
     """The path of a binding, which may be given as a mapping; None for None."""
-    return None if given is None else kept(given, "binding.toml", "binding")
+    return None if given is None else path_of_given(given, "binding.toml", "binding")
 
 
-def kept(given: Any, name: str, argument: str) -> Path:
+def path_of_given(given: Any, name: str, argument: str) -> Path:
     """The path of a file that is given, or of one in the cache with what is given: for ``.toml`` a mapping, for
     ``.csv`` a table, or rows by the names of operating points."""
     if not isinstance(given, Mapping) and not hasattr(given, "to_csv"):

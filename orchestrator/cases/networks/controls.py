@@ -9,7 +9,7 @@ from fmus.grid.network import Shunt
 from orchestrator.cases.flow.power_flow import PowerFlow
 from orchestrator.cases.networks.conversion import ImportedNetwork, branch_names, bus_of
 from orchestrator.cases.networks.psse.raw_network import RawNetwork
-from orchestrator.core.errors import counted
+from orchestrator.core.errors import number_of
 from orchestrator.systems.coupling.system import ComponentPlan
 
 TAP = "tap"  # parameter that a transformer's control moves
@@ -68,15 +68,15 @@ class MovingNetwork:
     def in_words(self) -> str:
         """Tell what moves."""
         return (
-            f"{self.counted} can move step by step to hold a voltage (COD1 = 1 of two windings, MODSW = 1): they do in "
-            "the power flow after an outage; all others are held"
+            f"{self.counts_in_words} can move step by step to hold a voltage (COD1 = 1 of two windings, MODSW = 1): "
+            "they do in the power flow after an outage; all others are held"
         )
 
     @property
-    def counted(self) -> str:
+    def counts_in_words(self) -> str:
         """Count the taps and shunts that can move; "" where none can."""
         kinds = {"tap": self.taps, "switched shunt": self.shunts}
-        return " and ".join(counted(number, what) for what, number in kinds.items() if number)
+        return " and ".join(number_of(number, what) for what, number in kinds.items() if number)
 
 
 def with_controls(raw: RawNetwork, network: ImportedNetwork) -> MovingNetwork:
@@ -135,7 +135,7 @@ def _of_one_sign(values: Sequence[float], *, is_negative: bool) -> tuple[float, 
     return tuple(sorted(sign * size for size in sizes))
 
 
-def settled(
+def solve_with_controls(
     find: Callable[[], PowerFlow], grid: ComponentPlan, controls: Sequence[Control]
 ) -> PowerFlow:
     """Solve, and move what is out of its band by one position, until nothing is left to move.

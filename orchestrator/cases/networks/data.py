@@ -361,7 +361,9 @@ def _read_from_raw(asked: _Asked) -> _Source:
     moving = with_controls(raw, imported)
     if table.move_controls:
         imported = moving.network
-        text = moving.in_words if moving.counted else "no tap and no switched shunt can move"
+        text = (
+            moving.in_words if moving.counts_in_words else "no tap and no switched shunt can move"
+        )
         changes.append(Problem(raw.tables.name, text))
     solved = solved_devices(raw.devices, imported, stated_voltages(raw.tables.bus))
     changes += device_notes(solved, table, raw.tables.name)
@@ -382,7 +384,7 @@ def _read_from_raw(asked: _Asked) -> _Source:
         device_loads=solved.loads,
         file_loads=raw.loads,
         controls=moving.controls if table.move_controls else (),
-        counted_controls=moving.counted,
+        counted_controls=moving.counts_in_words,
         raw=raw,
     )
 

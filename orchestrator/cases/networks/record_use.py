@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
-from orchestrator.core.errors import counted
+from orchestrator.core.errors import number_of
 
 
 class UseOfRecord(StrEnum):
@@ -38,7 +38,7 @@ def in_one_line(records: Sequence[RecordUse]) -> str:
         parts.append(
             f"{kinds.total()} {use}" + (f" ({named})" if use is not UseOfRecord.USED else "")
         )
-    return f"{counted(len(records), 'record')}: {', '.join(parts)}" if parts else ""
+    return f"{number_of(len(records), 'record')}: {', '.join(parts)}" if parts else ""
 
 
 def details(records: Sequence[RecordUse]) -> list[str]:

@@ -45,7 +45,7 @@ class Changes:
         """Add a record by its line, or an element by its name; those with the same text become one row."""
         self._items[text].append(item)
 
-    def listed(self) -> list[Problem]:
+    def as_problems(self) -> list[Problem]:
         """One row for each text, complete: how many, what was done, and every line or name."""
         return [
             Problem(

@@ -6,7 +6,7 @@ from fmus.grid.element_data import Load
 from orchestrator.cases.networks.load_models import in_words
 from orchestrator.cases.scenario.drawing_devices import LOAD, drawn_mw, with_motors
 from orchestrator.cases.scenario.prepare import PreparedScenario
-from orchestrator.core.errors import counted
+from orchestrator.core.errors import number_of
 
 # keys of ``[network]`` that name another program's data
 SOURCES = ("raw", "matpower", "pandapower", "cgmes")
@@ -33,7 +33,7 @@ class Facts:
 
     def sentence(self) -> str:
         units = [
-            counted(n, what)
+            number_of(n, what)
             for n, what in (
                 (self.machines, "machine"),
                 (self.converters, "converter"),
@@ -46,7 +46,7 @@ class Facts:
         parts = [
             "phasor models" if self.phasors else "EMT models",
             *([f"{self.frequency_hz:g} Hz"] if self.frequency_hz else []),
-            counted(self.buses, "bus"),
+            number_of(self.buses, "bus"),
             *units,
             *(["no governor"] if self.machines and not self.governed else []),
             f"{self.load_mw:.5g} MW of load ({self.load_model})",

@@ -16,7 +16,7 @@ from orchestrator.cases.flow.limits import Limits
 from orchestrator.cases.flow.power_flow import FlowUnit, PowerFlow, solve_power_flow
 from orchestrator.cases.flow.sharing import Dispatch, Room, shared_flow
 from orchestrator.cases.form.remedies import KEEPING_LIMITS
-from orchestrator.cases.networks.controls import Control, settled
+from orchestrator.cases.networks.controls import Control, solve_with_controls
 from orchestrator.cases.networks.load_models import FlowLaws
 from orchestrator.cases.scenario.flow_units import flow_unit
 from orchestrator.core.errors import ErrorKind, InputError
@@ -90,7 +90,9 @@ def start_from_power_flow(
         above = {n: mva for n, mva in (ratings or {}).items() if mva > plans[n].number("S_n")}
         return shared_flow(solve, feeding, plans, slack, dispatch, Room(active or {}, above))
 
-    flow = settled(find, system.components[grid], _acting(controls, feeding, system, grid))
+    flow = solve_with_controls(
+        find, system.components[grid], _acting(controls, feeding, system, grid)
+    )
     for bus, voltage in ((bus, flow.voltages[bus]) for bus in network.buses):
         system.components[grid].parameters |= {
             f"{bus}.v_0": abs(voltage),

@@ -320,7 +320,7 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> tuple[list[UnitRow], Sequen
         for line, text in row.replaced:
             begin = f"grid-following converter as {row.converter}: "
             changes.note(line, Remark(begin + text, begin + kind_of(text)))
-    draft.found.questions += changes.listed()
+    draft.found.questions += changes.as_problems()
     phasors = [row for row in rows if row.converter is not None]
     if phasors and not table.generator.endswith(_PHASOR):
         raise InputError.at(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.case import built_in_cases as names_of_cases
 from orchestrator.cases.case import load_case
-from orchestrator.cases.form.given import keep, kept
+from orchestrator.cases.form.given import keep, path_of_given
 from orchestrator.cases.form.locate import FROM_TEXT
 from orchestrator.cases.form.names import close_names
 from orchestrator.cases.form.schema import CaseTable
@@ -78,7 +78,7 @@ def load(case: str | Path | Mapping[str, Any], *, trust_fmus: bool = False) -> "
     if isinstance(case, Mapping):
         return Case(
             load_case(
-                kept({"directory": str(Path.cwd()), **case}, "case.toml", "case"),
+                path_of_given({"directory": str(Path.cwd()), **case}, "case.toml", "case"),
                 trust_fmus=trusted,
             )
         )

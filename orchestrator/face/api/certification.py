@@ -14,7 +14,7 @@ from orchestrator.core.truth import NoTruth
 from orchestrator.face.api.methods import function
 from orchestrator.face.api.progress import shown_progress
 from orchestrator.output.report.notebook import page
-from orchestrator.output.results.lock import held
+from orchestrator.output.results.lock import hold_folder
 from orchestrator.output.signatures.checking import State
 from orchestrator.output.signatures.signing import check_key
 from orchestrator.studies.certification.acceptance import run_checks
@@ -73,7 +73,7 @@ def _certified(request: CertifyRequest) -> IssuedCertificate:
     place = made_folder(Path(request.folder or usual_folder(file.stem, request.code)), "folder")
     spare_another(place, request.code, issue.request.fmu, issue.request.binding)
     with (
-        held(place),
+        hold_folder(place),
         shown_progress(f"Certificate, {request.code}", shown=request.progress) as report,
     ):
         with closing(

@@ -114,7 +114,7 @@ def nyquist(
         x_r=x_r,
         rating_mva=rated,
         kilovolt=kilovolt,
-    ).judged()
+    ).judge()
 
 
 def _place(given: str | Path | Case, argument: str) -> str:
@@ -203,7 +203,7 @@ class Asked:
         found._given = self._given | values
         return found
 
-    def judged(self, report: Callable[[str], None] | None = None) -> Nyquist:
+    def judge(self, report: Callable[[str], None] | None = None) -> Nyquist:
         """Judge it."""
         result = study_cut(self._request(), report)
         return Nyquist(

@@ -169,7 +169,7 @@ class Modes(NoTruth, ask=".stability.stable, or len() for the number of modes in
         from orchestrator.studies.runs.files import write_modes  # noqa: PLC0415 - plots: a second to import
 
         place = made_folder(folder, "folder")
-        write_modes([self.result], place, (), [*beside.told([self.result])])
+        write_modes([self.result], place, (), [*beside.sentences_beside([self.result])])
         return place
 
     def plot(self, ax: Axes = None, *, radians: bool = False, annotate: bool = False) -> Axes:
@@ -402,7 +402,7 @@ class Run(NoTruth):
         save_netcdf(self.result.dataset, scenario.path / TRAJECTORY)
         save_run(self.result, scenario, csv=False)
         with staged(place, run_id, [name]) as staging:
-            save_study([self.result], staging, [*beside.told([self.result.modes])])
+            save_study([self.result], staging, [*beside.sentences_beside([self.result.modes])])
         return place
 
     def plot(self, signal: str | None = None, ax: Axes = None) -> Axes:

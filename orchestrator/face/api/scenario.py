@@ -33,7 +33,7 @@ from orchestrator.face.api.progress import shown_progress
 from orchestrator.face.api.results import Modes, Run
 from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ
 from orchestrator.output.report.notebook import page
-from orchestrator.output.results.lock import held
+from orchestrator.output.results.lock import hold_folder
 from orchestrator.output.results.recorded import IN_MEMORY
 from orchestrator.output.results.recording import recorded_size, temporary_recording
 from orchestrator.studies.modes.modes import ModesResult, compute_modes, running
@@ -95,7 +95,7 @@ def _run(scenario: Scenario, request: RunRequest) -> Run:
         kept = request.checkpoints if isinstance(request.checkpoints, Checkpoints) else None
         if request.checkpoints is not None and kept is None:
             folder = path_of(request.checkpoints, "checkpoints", "folder")
-            stack.enter_context(held(folder))
+            stack.enter_context(hold_folder(folder))
             kept = _checkpoints(
                 prepared, folder, cast("float | None", request.checkpoint_every) or EVERY
             )

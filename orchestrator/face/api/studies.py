@@ -15,7 +15,7 @@ from orchestrator.face.api.methods import Asks, Shown, method
 from orchestrator.face.api.progress import shown_progress, shown_stages
 from orchestrator.face.api.scenario import Scenario, question
 from orchestrator.face.api.scenario import choose as chosen_of
-from orchestrator.output.results.lock import held
+from orchestrator.output.results.lock import hold_folder
 from orchestrator.studies.coordinated_design.command import STUDY as COORDINATED_DESIGN
 from orchestrator.studies.coordinated_design.one_point import design_controller
 from orchestrator.studies.interactions.command import STUDY as INTERACTIONS
@@ -78,7 +78,7 @@ def _computed(study: Study[..., Shown], file: CaseFile, request: Any) -> Shown:
     title = study.counted.capitalize()
     with (
         shown_progress(title, shown=request.progress) as report,
-        nullcontext() if kept is None else held(kept),
+        nullcontext() if kept is None else hold_folder(kept),
     ):
         return cast("Shown", study.compute(planned, executor, kept, report))
 

@@ -10,7 +10,7 @@ from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder
 from orchestrator.core.truth import NoTruth
 from orchestrator.output.report.notebook import page
-from orchestrator.output.results.lock import held
+from orchestrator.output.results.lock import hold_folder
 from orchestrator.studies.certification.codes.frequency import files, measurement
 from orchestrator.studies.certification.codes.frequency.point import AtPoint
 from orchestrator.studies.certification.kinds import bench_request
@@ -54,7 +54,7 @@ class VoltageSource(NoTruth, ask=".verdict, which is True, False, or None where 
     def save(self, folder: str | Path) -> list[Path]:
         """Write figures, impedances and their picture into a folder; returns their paths."""
         place = made_folder(path_of(folder, "folder", "folder"), "folder")
-        with held(place):
+        with hold_folder(place):
             return files.save(self._points, self.content, place)
 
     def _repr_html_(self) -> str:

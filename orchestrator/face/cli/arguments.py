@@ -113,10 +113,10 @@ def add_request_arguments(parser: argparse._ActionsContainer, request: type) -> 
 
 
 def asked_by(options: argparse.Namespace, request: type) -> dict[str, Any]:
-    def given(name: str) -> Any:
+    def value_of(name: str) -> Any:
         return getattr(options, f"{_ASKED}{name}", getattr(options, name, None))
 
-    found = {name: (one.kind, given(name)) for name, one in asked_of(request).items()}
+    found = {name: (one.kind, value_of(name)) for name, one in asked_of(request).items()}
     asked: dict[str, Any] = {}
     for name, (kind, value) in found.items():
         if value is None or value is False or value == []:

@@ -28,7 +28,7 @@ from orchestrator.face.cli.terminal import (
 )
 from orchestrator.linear.spectra.modes import damping_ratio
 from orchestrator.output.report.tables import PlainTable, make_table, short
-from orchestrator.output.results.lock import held
+from orchestrator.output.results.lock import hold_folder
 from orchestrator.output.signatures.signing import check_key
 from orchestrator.simulation.watch.finding import MISFIT
 from orchestrator.studies.certification.acceptance import read_checks, run_checks
@@ -89,7 +89,7 @@ def _verdicts(found: Certificate) -> PlainTable:
         "Remark",
         left=99,
     )
-    judged = [v for v in found.verdicts if v.judged]
+    judged = [v for v in found.verdicts if v.is_judged]
     bad, unknown = (
         [v for v in judged if not v.accepted],
         [v for v in found.verdicts if v.not_judged],
@@ -105,7 +105,7 @@ def _verdicts(found: Certificate) -> PlainTable:
         known = [f for f in v.findings if f.accepted is not None]
         least = narrowest(known)
         word = "fails" if v in bad else "accepted"
-        word = word if v.judged else NO_VERDICT
+        word = word if v.is_judged else NO_VERDICT
         word = NOT_JUDGED if v in unknown else word
         failed = "; ".join(f"{f.criterion}: {f.text}" for f in v.failed)
         remark = v.not_judged or failed or (f"nearest: {least.criterion}" if least else "")
@@ -156,7 +156,7 @@ def _show_damping_test(found: DampingCertificate, console: Console) -> None:
         left=0,
     )
     for v in found.verdicts:
-        refusal = Text("not accepted" if v.judged else NOT_JUDGED, "red")
+        refusal = Text("not accepted" if v.is_judged else NOT_JUDGED, "red")
         table.add_row(f"{v.X_L:g}", *_figures(v), "accepted" if v.accepted else refusal)
     console.print(table, "")
     for v in found.verdicts:
@@ -272,7 +272,7 @@ def certified(
         check_key(options.sign)
     made_folder(folder, "--out")
     progress = Progressing(folder)
-    with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):
+    with saying_how_it_goes_on(progress.how_it_goes_on), hold_folder(folder):
         executor = choose_executor(options, [issue.parts.task.__module__])
         told = (f"{device.name}, {key}: computing", f"{issue.parts.one}s")
         found = progress.compute(
@@ -301,7 +301,7 @@ def run_stiffness(options: argparse.Namespace, device: Device) -> int:
     check_code_options(options, [device])
     folder = options.out or Path("results") / f"certify_{device.name}_{GB}"
     console = make_console(stderr=options.json)
-    with held(folder):
+    with hold_folder(folder):
         figures, files = measured_figures(device, folder)
     if options.json:
         print_json(figures)

@@ -15,7 +15,7 @@ from orchestrator.face.cli.certificate import (
     refuse_certificate_options,
 )
 from orchestrator.face.cli.terminal import make_console, print_json, said_stages
-from orchestrator.output.results.lock import held
+from orchestrator.output.results.lock import hold_folder
 from orchestrator.studies.certification.codes.row import checked
 from orchestrator.studies.certification.kinds import bench_request
 from orchestrator.studies.certification.request import rated_frequency
@@ -27,7 +27,7 @@ def run_frequency(options: argparse.Namespace, device: Device) -> int:
     checked((), dict(options.declare), FREQUENCY)
     check_code_options(options, [device])
     folder = options.out or Path("results") / f"certify_{device.name}_{FREQUENCY}"
-    with held(folder):
+    with hold_folder(folder):
         figures, files = measured_behaviour(device, folder)
     if options.json:
         print_json(figures)

@@ -24,7 +24,7 @@ from orchestrator.face.cli.certify_frequency import measured_behaviour
 from orchestrator.face.cli.certify_sensitivities import find_needs
 from orchestrator.face.cli.terminal import make_console, make_errors, print_json
 from orchestrator.output.report.tables import PlainTable, make_table
-from orchestrator.output.results.lock import held
+from orchestrator.output.results.lock import hold_folder
 from orchestrator.studies.certification.acceptance import KEPT
 from orchestrator.studies.certification.certificate import Certificate
 from orchestrator.studies.certification.codes.known import codes_by_declaration
@@ -63,7 +63,7 @@ def run_matrix(options: argparse.Namespace, devices: Sequence[Device]) -> int:
     folder = options.out or Path("results") / f"certify_{'matrix' if several else devices[0].name}"
     made_folder(folder, "--out")
     console = make_console(stderr=options.json)
-    with held(folder):
+    with hold_folder(folder):
         cells = {}
         for device in devices:
             own = argparse.Namespace(**vars(options))

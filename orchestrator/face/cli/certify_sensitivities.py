@@ -14,7 +14,7 @@ from orchestrator.face.cli.arguments import add_options, choose_executor
 from orchestrator.face.cli.interrupted import saying_how_it_goes_on
 from orchestrator.face.cli.study import Progressing
 from orchestrator.face.cli.terminal import print_parts
-from orchestrator.output.results.lock import held
+from orchestrator.output.results.lock import hold_folder
 from orchestrator.studies.certification.certificate import Certificate
 from orchestrator.studies.certification.codes import needs_record
 from orchestrator.studies.certification.codes.change_point import ChangeTask
@@ -71,7 +71,7 @@ def find_needs(
         executor = choose_executor(options, [ChangeTask.__module__])
         return progress.compute(lambda report: study(executor, report), executor, console)
 
-    with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):
+    with saying_how_it_goes_on(progress.how_it_goes_on), hold_folder(folder):
         needs = computed(lambda executor, report: run_changes(plan, executor, report))
         if options.confirm:
             computed(lambda executor, report: confirm_changes(plan, needs, executor, report))

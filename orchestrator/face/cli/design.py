@@ -24,7 +24,7 @@ from orchestrator.face.cli.case_arguments import (
     values_set,
 )
 from orchestrator.face.cli.interrupted import saying_how_it_goes_on
-from orchestrator.face.cli.study import shown, working_in
+from orchestrator.face.cli.study import print_study, working_in
 from orchestrator.face.cli.terminal import (
     make_console,
     print_json,
@@ -60,7 +60,7 @@ def run_over_points(options: argparse.Namespace, path: Path) -> int:
     files = ", ".join(one.name for one in written[1:])
     end = f"Parameter file {path}, beside it {files}; points are kept in {folder}"
     prepared = STUDY.prepared(planned)
-    return shown(options, STUDY, design, folder, written, end, prepared=prepared)
+    return print_study(options, STUDY, design, folder, written, end, prepared=prepared)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -28,7 +28,7 @@ from orchestrator.face.cli.verdict import (
     print_details,
 )
 from orchestrator.linear.spectra.modes import damping_ratio, in_range
-from orchestrator.output.results.lock import held
+from orchestrator.output.results.lock import hold_folder
 from orchestrator.studies.modes import beside
 from orchestrator.studies.modes.all_modes import compute_all_modes
 from orchestrator.studies.modes.load_model_weight import load_model_weights
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
     request = ModesRequest(**asked_by(options, ModesRequest))
     request.check()
     folder = made_folder(options.out, "--out") if options.out else None
-    with held(folder) if folder else nullcontext():
+    with hold_folder(folder) if folder else nullcontext():
         return _compute(scenarios, request, options, folder)
 
 
@@ -105,7 +105,7 @@ def _compute(
     weights = (
         [] if options.black_box else load_model_weights(scenarios, results, request.frequencies)
     )
-    written, said = [], [*beside.told(results)]
+    written, said = [], [*beside.sentences_beside(results)]
     if folder:
         from orchestrator.studies.runs.files import write_modes  # noqa: PLC0415 - plots: a second to import
 

@@ -80,7 +80,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _judge(options: argparse.Namespace, asked: Asked, folder: Path) -> Nyquist:
     with said_stages() as report:
-        found = asked.judged(report)
+        found = asked.judge(report)
         say("question", found.result.questions)
         if options.retune:
             found.retune(options.parameter, distance=options.distance or GOAL, report=report)

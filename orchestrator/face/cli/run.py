@@ -33,7 +33,7 @@ from orchestrator.face.cli.run_tables import print_run
 from orchestrator.face.cli.side_by_side import Outcome, Report, SideBySide, number_of_workers
 from orchestrator.face.cli.verdict import add_details_argument, add_verdict_argument, exit_code
 from orchestrator.output.report.progress import progress_bar
-from orchestrator.output.results.lock import held
+from orchestrator.output.results.lock import hold_folder
 from orchestrator.output.results.manifest import read_manifest
 from orchestrator.output.results.recorded import open_whole
 from orchestrator.output.results.recording import FOLDER, TRAJECTORY, RecordingFolder, require_room
@@ -75,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the scenarios while no other command works in the folder of the results."""
     with ExitStack() as stack:
         if options.resume is not None and options.resume.is_dir():
-            stack.enter_context(held(options.resume))  # before the request in it is read
+            stack.enter_context(hold_folder(options.resume))  # before the request in it is read
         options = run_request.with_request(options)
         stack.enter_context(saying_how_it_goes_on(lambda: run_request.how_it_goes_on(options)))
         rules = _rules_of(options)
@@ -91,7 +91,7 @@ def run(options: argparse.Namespace) -> int:
         )
         folder = made_folder(options.out, "--out")
         if options.resume is None:
-            stack.enter_context(held(folder))
+            stack.enter_context(hold_folder(folder))
         if rules is not None:
             return _run_like(
                 [scenario.prepared for scenario in scenarios], rules, folder, options.order
@@ -162,7 +162,7 @@ def _run_all(
             kept.end(whole=False)
         raise error
     early_end = _early_end(stopped, scenarios, results) if stopped else None
-    said = [*beside.told([r.modes for r in results])]
+    said = [*beside.sentences_beside([r.modes for r in results])]
     plots = _save_together(results, said, folder, run_id, stopped, early_end)
     if options.json:
         terminal.print_json([summary_of(r) for r in results])

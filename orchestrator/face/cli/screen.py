@@ -10,7 +10,7 @@ from rich.markup import escape
 from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import made_folder
 from orchestrator.face.cli.arguments import option, repeatable
-from orchestrator.face.cli.study import add_study_arguments, shown, working_in
+from orchestrator.face.cli.study import add_study_arguments, print_study, working_in
 from orchestrator.face.cli.terminal import make_console, make_errors, print_parts
 from orchestrator.studies.operating_points.item import Status
 from orchestrator.studies.points.store import POINTS
@@ -36,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
         found, shard = compute(options.shard), options.shard
         if shard is None:
             written, prepared = found.save(folder), STUDY.prepared(planned)
-            return shown(options, STUDY, found, folder, written, prepared=prepared)
+            return print_study(options, STUDY, found, folder, written, prepared=prepared)
         part, whole = len(found.result.items), planned.number_of_items
         text = f"part {shard.number} of {shard.total}: {part} of {whole} items are kept in {folder}"
         print_parts(make_console(stderr=options.json), [escape(text)])

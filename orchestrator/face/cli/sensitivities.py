@@ -20,7 +20,7 @@ from orchestrator.face.cli.arguments import (
 from orchestrator.face.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.face.cli.terminal import make_console, print_json, print_warnings, warn
 from orchestrator.face.cli.verdict import add_verdict_argument, exit_code, print_verdicts
-from orchestrator.output.results.lock import held
+from orchestrator.output.results.lock import hold_folder
 from orchestrator.studies.sensitivities.request import SensitivitiesRequest
 from orchestrator.studies.sensitivities.view import left_out, sensitivity_table
 
@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
     """Compute, print, and write what is asked for; returns 1 if no parameter has a derivative."""
     scenarios = chosen(options)
     folder = made_folder(options.out, "--out") if options.out else None
-    with held(folder) if folder else nullcontext():
+    with hold_folder(folder) if folder else nullcontext():
         return _compute(scenarios, options, folder)
 
 

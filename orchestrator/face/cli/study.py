@@ -27,7 +27,7 @@ from orchestrator.face.cli.terminal import (
 )
 from orchestrator.face.cli.verdict import add_verdict_argument
 from orchestrator.output.report.progress import progress_bar
-from orchestrator.output.results.lock import held
+from orchestrator.output.results.lock import hold_folder
 from orchestrator.studies.points.executor import Executor
 from orchestrator.studies.points.points import CountReport
 from orchestrator.studies.points.store import POINTS, any_kept
@@ -113,7 +113,7 @@ def run_study(name: str, study: AnyStudy | Simple, options: argparse.Namespace) 
     with working_in(options, name, study) as (planned, compute, folder):
         found = compute()
         written, prepared = found.save(folder), study.prepared(planned)
-        return shown(options, study, found, folder, written, prepared=prepared)
+        return print_study(options, study, found, folder, written, prepared=prepared)
 
 
 def _run_at_once(name: str, study: Simple, options: argparse.Namespace) -> int:
@@ -159,11 +159,11 @@ def working_in(
                 say("warning", [f"{text}, and its points stay; give another --out to keep both"])
             return found
 
-        with held(made_folder(folder, "--out")):
+        with hold_folder(made_folder(folder, "--out")):
             yield planned, compute, folder
 
 
-def shown(
+def print_study(
     options: argparse.Namespace,
     study: AnyStudy,
     found: Any,

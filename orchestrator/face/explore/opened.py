@@ -103,7 +103,7 @@ def _rows(certificate: Certificate) -> Iterator[tuple[str, str, dict[str, Any]]]
             bench,
             {
                 "text": "\n".join(said),
-                "stable": verdict.accepted if verdict.judged else None,
+                "stable": verdict.accepted if verdict.is_judged else None,
                 "pictures": [
                     {"label": label, "caption": caption, "curves": list(map(_drawn, curves))}
                     for label, curves, caption in pictures

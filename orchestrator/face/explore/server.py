@@ -81,7 +81,7 @@ class Explorer:
         self._pages[page] = queue.SimpleQueue()
         return self._pages[page]
 
-    def left(self, page: str, told: "queue.SimpleQueue[Answer]") -> None:
+    def close_page(self, page: str, told: "queue.SimpleQueue[Answer]") -> None:
         """A page was closed, unless it came again meanwhile; nobody waits any more for what it asked."""
         self._last_seen = time.monotonic()
         if self._pages.get(page) is told:
@@ -168,7 +168,7 @@ def _handler(explorer: Explorer) -> type[BaseHTTPRequestHandler]:
             except OSError:
                 self.close_connection = True
             finally:
-                explorer.left(page, told)
+                explorer.close_page(page, told)
 
         def _head(self, status: HTTPStatus, kind: str, length: int | None) -> None:
             self.send_response(status)

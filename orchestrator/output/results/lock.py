@@ -19,7 +19,7 @@ LOCK = ".lock"
 
 
 @contextmanager
-def held(folder: Path) -> Iterator[None]:
+def hold_folder(folder: Path) -> Iterator[None]:
     """Hold a folder, which is made where it is missing; the lock ends with the process, whatever ends that.
 
     Windows, and network drives without locks, have no such lock: there nobody is refused."""

@@ -91,7 +91,7 @@ class Certificate:
     @property
     def missing(self) -> tuple[str, ...]:
         """Why a test that nothing fails is not passed, its departures included."""
-        done = {v.name for v in self.verdicts if v.judged}
+        done = {v.name for v in self.verdicts if v.is_judged}
         rows = tuple(
             f"row {r.name}" for r in self.code.rows if r.name not in done and not r.shown_only
         )
@@ -100,7 +100,7 @@ class Certificate:
     @property
     def verdict(self) -> str:
         return verdict_of(
-            [bool(row.accepted) for row in self.verdicts if row.judged], len(self.missing)
+            [bool(row.accepted) for row in self.verdicts if row.is_judged], len(self.missing)
         )
 
     @property
@@ -113,7 +113,7 @@ class Certificate:
 
     @property
     def margins(self) -> list[CriterionMargin]:
-        return [margin for row in self.verdicts if row.judged for margin in row.margins()]
+        return [margin for row in self.verdicts if row.is_judged for margin in row.margins()]
 
     def sentence(self) -> str:
         """The verdict, with what failed or was not tested."""
@@ -145,7 +145,7 @@ class Certificate:
 
     def test_in_words(self) -> str:
         """Return the sentence on the test alone, without the acceptance tests."""
-        judged = [v for v in self.verdicts if v.judged]
+        judged = [v for v in self.verdicts if v.is_judged]
         bad = [v for v in judged if not v.accepted]
         subject, title = f"The converter {self.description.model_name!r}", self.code.title
         rows = f"{len(judged) - len(bad)} of {len(judged)} judged rows are accepted."
@@ -204,7 +204,7 @@ class DampingCertificate(Certificate):
         reasons = incomplete_because(missing_of(self), self.departures)
         if self.verdict == PASSES:
             return f"{subject} passes the damping test at all {len(REACTANCES)} line reactances, by both criteria."
-        judged = [v for v in self.verdicts if v.judged]
+        judged = [v for v in self.verdicts if v.is_judged]
         if self.verdict == FAILS:
             failed = [v for v in judged if not v.accepted]
             places, first = ", ".join(f"{v.X_L:g}" for v in failed), failed[0]
@@ -212,14 +212,14 @@ class DampingCertificate(Certificate):
             text += f"{'; '.join(first.faults)}."
             return f"{text} The test is incomplete as well: {reasons}." if reasons else text
         where = "is accepted where it was judged" if judged else "was judged nowhere"
-        unknown = [v for v in self.verdicts if not v.judged]
+        unknown = [v for v in self.verdicts if not v.is_judged]
         text = f"The damping test is incomplete: {reasons}. {subject} {where}"
         return f"{text}; at {unknown[0].X_L:g} pu, {unknown[0].unknown}." if unknown else f"{text}."
 
 
 def missing_of(c: Certificate) -> tuple[float, ...]:
     """Reactances of the norm that were not judged [pu]."""
-    done = [v.X_L for v in c.verdicts if v.judged]
+    done = [v.X_L for v in c.verdicts if v.is_judged]
     return tuple(X for X in REACTANCES if not any(same_reactance(X, value) for value in done))
 
 
@@ -244,7 +244,7 @@ def _refused(request: CertificationRequest, error: CaseError, trial: str, where:
     """The same problems, each at the option or in the file of the user that it comes from."""
     own = {f"{trial}/{FMU}": str(request.fmu), f"{trial}/{BINDING}": str(request.binding)}
 
-    def said(text: str) -> str:
+    def with_own_paths(text: str) -> str:
         for laid, given in own.items():
             text = text.replace(laid, given)
         return text
@@ -255,7 +255,7 @@ def _refused(request: CertificationRequest, error: CaseError, trial: str, where:
         value = _OWN.match(place)
         if value and value["name"] in request.values:
             place = Option.SET + f" {value['name']}={_value_text(request.values[value['name']])}"
-        text = said(problem.text).replace(f"component {CONVERTER!r} has", "the FMU has")
+        text = with_own_paths(problem.text).replace(f"component {CONVERTER!r} has", "the FMU has")
         problems.append(Problem(place, text))
     if request.binding is None and any(
         p.place.startswith(f"components.{CONVERTER}") for p in problems

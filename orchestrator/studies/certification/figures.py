@@ -142,7 +142,7 @@ def _point_json(c: Certificate, v: PointVerdict) -> dict[str, Any]:
     return {
         "X_L": v.X_L,
         "accepted": v.accepted,
-        "judged": v.judged,
+        "judged": v.is_judged,
         "faults": list(v.faults),
         "unknown": v.unknown,
         "modes": [mode_json(m) for m in v.modes],

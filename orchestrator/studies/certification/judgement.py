@@ -86,12 +86,12 @@ class PointVerdict:
         return row_of(self.X_L)
 
     @property
-    def judged(self) -> bool:
+    def is_judged(self) -> bool:
         return not self.unknown
 
     @property
     def accepted(self) -> bool:
-        return self.judged and not self.faults
+        return self.is_judged and not self.faults
 
     @property
     def eigenvalues_accepted(self) -> bool:

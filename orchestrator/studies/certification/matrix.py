@@ -9,7 +9,7 @@ from typing import Any
 from urllib.parse import quote
 
 from orchestrator.cases.form.devices import Device
-from orchestrator.core.errors import InputError, counted
+from orchestrator.core.errors import InputError, number_of
 from orchestrator.core.safe_files import write_text
 from orchestrator.devices.fmi.values import as_text
 from orchestrator.output.report.html.elements import document, table
@@ -78,7 +78,7 @@ class MatrixCell:
     def take(self, found: Certificate) -> None:
         self.verdict, self.sentence, self.refused = found.verdict, found.sentence(), found.refused
         self.margins, self.missing = found.margins, len(found.missing)
-        self.judged = sum(1 for v in found.verdicts if v.judged)
+        self.judged = sum(1 for v in found.verdicts if v.is_judged)
 
     @property
     def narrowest(self) -> CriterionMargin | None:
@@ -132,7 +132,7 @@ class CertificateMatrix:
             if any(self.cells[name, code].refused for code in self.codes)
         ]
         text = (
-            f"Of {counted(len(verdicts), 'certificate')}: {judged}."
+            f"Of {number_of(len(verdicts), 'certificate')}: {judged}."
             if verdicts
             else "No certificate was asked for."
         )

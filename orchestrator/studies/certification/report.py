@@ -9,7 +9,7 @@ from orchestrator.devices.binding.binding import read_table
 from orchestrator.devices.fmi.archive import read_origin
 from orchestrator.devices.fmi.port import BoundDescription
 from orchestrator.devices.fmi.values import Scalar, as_text
-from orchestrator.output.report.html.elements import SHADES, Figures, document, listed, table
+from orchestrator.output.report.html.elements import SHADES, Figures, bullet_list, document, table
 from orchestrator.output.report.tables import short
 from orchestrator.studies.certification.case_file import BINDING, FMU, WITH
 from orchestrator.studies.certification.certificate import Certificate, DampingCertificate
@@ -205,7 +205,7 @@ def page(c: Certificate, hashes: Hashes, made: datetime) -> str:
         ("Binding", binding(c, hashes)),
         (
             "How the code was read",
-            f"{listed(readings)}<p>{escape(c.code.source)}, {escape(c.code.date)}.</p>",
+            f"{bullet_list(readings)}<p>{escape(c.code.source)}, {escape(c.code.date)}.</p>",
         ),
         ("Provenance", provenance(c, said, hashes)),
     ]

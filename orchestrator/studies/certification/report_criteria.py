@@ -53,8 +53,8 @@ def damping_chapters(c: DampingCertificate, figures: Figures) -> list[tuple[str,
 
 
 def damping_findings(c: DampingCertificate) -> Iterator[str]:
-    yield f"Eigenvalue criterion: {_where([v for v in c.verdicts if v.judged and not v.eigenvalues_accepted])}"
-    bad = [v for v in c.verdicts if v.judged and (v.time is None or not v.time.accepted)]
+    yield f"Eigenvalue criterion: {_where([v for v in c.verdicts if v.is_judged and not v.eigenvalues_accepted])}"
+    bad = [v for v in c.verdicts if v.is_judged and (v.time is None or not v.time.accepted)]
     yield f"Time-domain criterion on {signal_name(c.signal)}: {_where(bad)}"
     yield escape(converter_model(c.results[WITH, v.X_L] for v in c.verdicts))
     yield f"Damping controllers: {PODS[c.pod]} ({escape(c.controllers.source)})"
@@ -316,7 +316,7 @@ def _overview(c: Certificate) -> str:
 
 def _verdict_cell(c: Certificate, v: PointVerdict) -> str:
     beyond = "" if any(v.name == row.name for row in c.code.rows) else ", beyond the norm's"
-    return (verdict(v.accepted) if v.judged else '<span class="bad">not judged</span>') + beyond
+    return (verdict(v.accepted) if v.is_judged else '<span class="bad">not judged</span>') + beyond
 
 
 def _time_cells(time: TimeVerdict | None) -> list[str]:

@@ -42,7 +42,7 @@ from orchestrator.studies.coordinated_design.verdict import (
     MORE,
     JudgedPoint,
     PointsVerdict,
-    judged,
+    judge_points,
     least_of,
 )
 from orchestrator.studies.modes.naming import modes_named
@@ -387,7 +387,7 @@ def design_over_points(
     }
     where = [plan.read.of(item) for item in plan.read.items]
     points = tuple(
-        judged(
+        judge_points(
             where,
             before,
             after,

@@ -142,7 +142,7 @@ class JudgedPoint:
         )
 
 
-def judged(
+def judge_points(
     where: Sequence[tuple[OperatingCase, Outage]],
     before: Sequence[PointModes],
     after: Sequence[PointModes],

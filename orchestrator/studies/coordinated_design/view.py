@@ -314,7 +314,7 @@ def ranking_table(design: PointsDesign) -> ColumnTable[RankedConverter]:
 
         return value
 
-    def shown(form: str) -> Callable[[Any], str]:
+    def in_format(form: str) -> Callable[[Any], str]:
         return lambda figure: "–" if figure == "" else f"{figure:{form}}"
 
     def damping(figure: Callable[[RankedConverter], float | None]) -> Callable[[Any], str]:
@@ -358,13 +358,13 @@ def ranking_table(design: PointsDesign) -> ColumnTable[RankedConverter]:
                 lambda one: "" if one.least is None else 100 * one.least,
                 name="least_damping_of_all_percent",
             ),
-            Column("K [pu]", setting("K"), shown(".4g"), "K"),
-            Column("T_S1 [s]", setting("T_S1"), shown(".4f"), "T_S1"),
-            Column("T_S2 [s]", setting("T_S2"), shown(".4f"), "T_S2"),
+            Column("K [pu]", setting("K"), in_format(".4g"), "K"),
+            Column("T_S1 [s]", setting("T_S1"), in_format(".4f"), "T_S1"),
+            Column("T_S2 [s]", setting("T_S2"), in_format(".4f"), "T_S2"),
             Column(
                 "shift by 1 pu [rad/s]",
                 setting("shift_rad_s_per_pu"),
-                shown(".3g"),
+                in_format(".3g"),
                 "shift_rad_s_per_pu",
             ),
         ),

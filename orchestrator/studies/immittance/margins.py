@@ -105,7 +105,7 @@ def margins_of(path: LoopPath, crossings: list[Crossing]) -> NyquistMargins:
                 hertz = float(path.hertz[i] + t * (path.hertz[i + 1] - path.hertz[i]))
                 turned.append(Margin(float(abs(np.rad2deg(np.angle(np.exp(1j * angle))))), hertz))
                 delayed.append(Margin(float(angle % (2 * np.pi) / (2 * np.pi * hertz)), hertz))
-    counted = told(path)
+    counted = where_distance_counts(path)
     one, disk = np.eye(path.L.shape[-1]), np.full(len(path.s), np.inf)
     disk[counted & (path.distance <= _TOUCHES)] = 0.0
     counted = counted & (path.distance > _TOUCHES)
@@ -132,7 +132,7 @@ def _least(margins: list[Margin]) -> Margin | None:
     return min(margins, key=lambda m: m.value, default=None)
 
 
-def told(path: LoopPath) -> NDArray[np.bool_]:
+def where_distance_counts(path: LoopPath) -> NDArray[np.bool_]:
     """Where a distance counts: from the slowest frequency on, and where a free angle's locus still comes away from −1,
     from there on where it no longer does."""
     counted = path.on_axis & (path.hertz >= min(_SLOWEST, path.hertz[-1]))
@@ -145,7 +145,7 @@ def told(path: LoopPath) -> NDArray[np.bool_]:
 
 
 def _where_least(path: LoopPath, values: Numbers) -> Margin:
-    k = int(np.argmin(np.where(told(path), values, np.inf)))
+    k = int(np.argmin(np.where(where_distance_counts(path), values, np.inf)))
     return Margin(float(values[k]), float(path.hertz[k]))
 
 

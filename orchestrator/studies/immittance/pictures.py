@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from orchestrator.output.report.plot_style import STYLE, add_legend, colour, save_figure
 from orchestrator.studies.immittance.judgement import CutJudgement
 from orchestrator.studies.immittance.retune import Retuned
-from orchestrator.studies.immittance.sides import named
+from orchestrator.studies.immittance.sides import short_name
 from orchestrator.studies.immittance.study import CutResult
 
 _PANELS = 4  # parameters in a picture
@@ -24,7 +24,9 @@ def draw(
     loci, matrices = folder / "eigenloci.png", folder / "matrices.png"
     with mpl.rc_context(STYLE):
         save_figure(
-            _eigenloci(result.judgement, f"{result.verdict}: {named(result.loop.device.name)}"),
+            _eigenloci(
+                result.judgement, f"{result.verdict}: {short_name(result.loop.device.name)}"
+            ),
             loci,
         )
         save_figure(_matrices(result), matrices)

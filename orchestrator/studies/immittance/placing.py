@@ -59,7 +59,7 @@ def in_one_frame(scans: dict[str, Scan], angle: float | None) -> bool:
     return True
 
 
-def placed(
+def place_scan(
     scan: Scan, cut: Cut, name: str, kilovolt: float | None, angle: float | None
 ) -> tuple[Scan, bool]:
     """A scan in per unit at a component's place, in the network's frame; whether it is known how that lies.

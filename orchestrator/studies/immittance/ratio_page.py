@@ -11,8 +11,8 @@ from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
 from orchestrator.output.report.html.elements import document, held_data
 from orchestrator.studies.immittance.judgement import CutJudgement, judge_loop
-from orchestrator.studies.immittance.margins import told
-from orchestrator.studies.immittance.sides import named
+from orchestrator.studies.immittance.margins import where_distance_counts
+from orchestrator.studies.immittance.sides import short_name
 from orchestrator.studies.immittance.strength import SourceBehind
 from orchestrator.studies.immittance.study import CutResult
 
@@ -66,7 +66,7 @@ def ratio_page(result: CutResult) -> str:
         for k in turn
     ]
     path = result.judgement.path
-    kept = np.flatnonzero(np.logical_and(path.on_axis, told(path)))
+    kept = np.flatnonzero(np.logical_and(path.on_axis, where_distance_counts(path)))
     kept = kept[:: len(kept) // _POINTS + 1]
     L = path.L[kept]
     content = {
@@ -75,7 +75,7 @@ def ratio_page(result: CutResult) -> str:
         "loop": _parts(L.reshape(-1, 4)),
         "loci": _parts(path.loci[kept]),
         "judged": [one.as_json() for one in judged],
-        "device": named(result.loop.device.name),
+        "device": short_name(result.loop.device.name),
         "off": _largest_error(result, judged),
     }
     findings = (
@@ -114,7 +114,7 @@ def _behind(result: CutResult, source: SourceBehind, own: float, ratio: float) -
 def _largest_error(result: CutResult, judged: list[JudgedRatio]) -> float:
     """Return how far the distances of the page's points are from those of the judged ratios, at most."""
     path = result.judgement.path
-    L = path.L[np.logical_and(path.on_axis, told(path))]
+    L = path.L[np.logical_and(path.on_axis, where_distance_counts(path))]
     off = [0.0]
     for one in judged:
         if not one.judgement.reasons:

@@ -231,7 +231,7 @@ class Behind(Known):
         return np.asarray(closed[:, self.rows])
 
 
-def named(devices: str) -> str:
+def short_name(devices: str) -> str:
     """A side's name for a line: many devices are counted."""
     count = devices.count(",") + 1
     return devices if count <= _FEW else f"{devices.partition(',')[0]} and {count - 1} more"

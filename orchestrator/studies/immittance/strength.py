@@ -11,7 +11,7 @@ from orchestrator.core.arrays import Complex, Vector
 from orchestrator.studies.immittance.cut import Cut
 from orchestrator.studies.immittance.judgement import CutJudgement
 from orchestrator.studies.immittance.loop import NO_MODES, CutLoop
-from orchestrator.studies.immittance.margins import told
+from orchestrator.studies.immittance.margins import where_distance_counts
 from orchestrator.studies.immittance.sides import Known, Side
 
 _MOST = 3  # critical frequencies that are named
@@ -36,7 +36,7 @@ class Critical:
 def critical(loop: CutLoop, judgement: CutJudgement, cut: Cut) -> list[Critical]:
     """The least distances from −1 and their frequencies, nearest first."""
     path = judgement.path
-    d = np.where(told(path), path.distance, np.inf)
+    d = np.where(where_distance_counts(path), path.distance, np.inf)
     inner = np.flatnonzero((d <= np.r_[np.inf, d[:-1]]) & (d <= np.r_[d[1:], np.inf]) & (d < _NEAR))
     found: list[int] = []
     for k in inner[np.argsort(d[inner])].tolist():

@@ -26,7 +26,7 @@ from orchestrator.studies.immittance.placing import (
     at_ports,
     in_one_frame,
     in_unit,
-    placed,
+    place_scan,
     sampled,
     scans_in,
 )
@@ -223,7 +223,7 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
         scans = {side: in_unit(scan, unit, request.kilovolt) for side, scan in scans.items()}
         known = in_one_frame(scans, request.angle)
     elif request.device is not None:
-        scans["device"], known = placed(
+        scans["device"], known = place_scan(
             scans["device"], cut, cut.devices[0], request.kilovolt, request.angle
         )
     questions = tuple(q for scan in scans.values() for q in scan.questions) + (
@@ -291,7 +291,7 @@ def _opened(
     request = replace(request, frequency=cut.rated_hz or request.frequency)
     for name, table in held.items():
         scan = _read(request, "device", case.case.directory / str(table.scan))
-        scans[name], known = placed(
+        scans[name], known = place_scan(
             scan, cut, name, table.voltage or request.kilovolt, request.angle
         )
         sure.append(known)

@@ -16,7 +16,7 @@ from orchestrator.output.report.tables import VerdictSentence, make_table
 from orchestrator.output.results.storage import save_json
 from orchestrator.studies.immittance.margins import Margin
 from orchestrator.studies.immittance.retune import Retuned, Study, Tunable, retune
-from orchestrator.studies.immittance.sides import named
+from orchestrator.studies.immittance.sides import short_name
 from orchestrator.studies.immittance.study import CutResult
 
 GOAL = 0.3  # distance from −1 that a retuning is to reach: all of L may be off by so much of 1
@@ -131,7 +131,7 @@ def parts(found: Nyquist) -> Iterator[RenderableType]:
         yield _strength(result)
     for side, bands in result.judgement.active.items():
         said = ", ".join(f"{a:.4g}–{b:.4g} Hz" for a, b in bands) or "nowhere"
-        yield escape(f"{side} ({named(getattr(result.loop, side).name)}) not passive: {said}")
+        yield escape(f"{side} ({short_name(getattr(result.loop, side).name)}) not passive: {said}")
     far = result.difference
     if far is not None:
         yield (

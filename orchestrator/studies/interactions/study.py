@@ -88,7 +88,7 @@ class InteractionsResult:
 def plan_interactions(case: Case, request: InteractionsRequest) -> InteractionsPlan:
     name, layers, step_size = _scenario(case, request.scenario), request.layers, request.step_size
     (prepared,) = case.prepare([name], request.overrides, step_size, None, request.files)
-    components = case.placed(name, {}, layers)
+    components = case.tables_and_plans(name, {}, layers)
     grid = None if case.table.power_flow is None else case.table.power_flow.grid
     places = places_of(components, grid)
     if not places:

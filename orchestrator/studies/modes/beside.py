@@ -14,7 +14,7 @@ from orchestrator.studies.modes.modes import ModesResult, compute_modes
 _SAME_VOLTAGE = 1e-4  # between two power flows that are one operating point [pu]
 
 
-def told(results: Sequence[ModesResult]) -> Iterator[str]:
+def sentences_beside(results: Sequence[ModesResult]) -> Iterator[str]:
     """A sentence on each scenario that others name as the one beside them, also where it was left out."""
     known = {r.prepared.name: r for r in results}
     wanted = {r.prepared.name: r.prepared.case.scenarios[r.prepared.name].beside for r in results}

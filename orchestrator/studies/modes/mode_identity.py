@@ -49,7 +49,7 @@ Computed = Callable[[PreparedScenario], NamedSystem]
 Undamped = Callable[[Mapping[str, float]], NamedSystem]  # gives the system itself with other gains
 
 
-def settled(
+def settle_names(
     system: NamedSystem,
     computed: Computed,
     known: Mapping[str, NamedSystem],
@@ -375,7 +375,7 @@ class _Others:
         if found is None:
             return None
         if not plain and name in self._earlier:
-            return settled(found, self._computed, self._known, far=False)
+            return settle_names(found, self._computed, self._known, far=False)
         clear = {
             key: mode
             for key, mode in found.naming.named.items()

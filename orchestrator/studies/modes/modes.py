@@ -37,7 +37,7 @@ from orchestrator.linear.spectra.mode_names import Naming
 from orchestrator.linear.spectra.stability import Hidden, Stability, hidden, whole_spectrum
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.simulation.engine import Engine
-from orchestrator.studies.modes.mode_identity import NamedSystem, settled
+from orchestrator.studies.modes.mode_identity import NamedSystem, settle_names
 from orchestrator.studies.modes.naming import named_modes
 from orchestrator.studies.modes.start_errors import start_error
 from orchestrator.systems.coupling.coupled import open_plan
@@ -423,7 +423,9 @@ def identified(
     ``master``: what keeps spectra of models that come again."""
     first, last = _named_range(frequency_range)
 
-    def named(other: PreparedScenario, at: OperatingPoint, linear: LinearModel) -> NamedSystem:
+    def name_system(
+        other: PreparedScenario, at: OperatingPoint, linear: LinearModel
+    ) -> NamedSystem:
         spectrum = keep_by_system(
             master, (first, last), (linear,), lambda: spectra.find_spectrum(linear, first, last)
         )
@@ -439,15 +441,15 @@ def identified(
                 else find_operating_point(beside)
             )
             linear = model_of(beside, Blocks(beside, directional=directional, known=boxes))
-        return named(other, at, linear)
+        return name_system(other, at, linear)
 
-    return settled(
+    return settle_names(
         NamedSystem(prepared, point, model, modes, named_modes(prepared.case, model, modes)),
         computed,
         known,
         undamped=None
         if at_gains is None
-        else lambda gains: named(prepared, point, at_gains(gains)),
+        else lambda gains: name_system(prepared, point, at_gains(gains)),
     )
 
 

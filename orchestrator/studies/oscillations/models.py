@@ -120,7 +120,7 @@ class _UnexplainedCurrents:
             self.reach(unit.reach, unit.voltage) @ extra[k] * (self.sure[k] > 0)
             for k, unit in enumerate(self.known)
         ]
-        self.parts = [self.left(effect) for effect in self.effects]
+        self.parts = [self.part_of_swing(effect) for effect in self.effects]
 
     def split(self, blocks: Complex) -> Complex:
         """Give of each unit the current that its model does not explain, and the voltage, along the mean and across."""
@@ -143,14 +143,14 @@ class _UnexplainedCurrents:
         )
         return np.asarray(there @ _frame(frame) if there.shape[1] == 2 else there)
 
-    def left(self, rest: Complex | Numbers) -> float:
+    def part_of_swing(self, rest: Complex | Numbers) -> float:
         """Part of all voltages' swing."""
         return float(np.linalg.norm(rest) / (np.linalg.norm(self.voltages) or 1.0))
 
     def beyond(self, effect: Complex) -> float:
         """Part that an effect leaves unexplained beyond the voltages' errors."""
         beside = np.abs(self.voltages - effect) - _CERTAIN * self._voltage_errors
-        return self.left(np.maximum(beside, 0.0))
+        return self.part_of_swing(np.maximum(beside, 0.0))
 
     def fit(self, there: Complex) -> Complex:
         """Give the voltages that a current of any size and phase explains best."""
@@ -158,7 +158,7 @@ class _UnexplainedCurrents:
 
     def best(self, there: Complex) -> float:
         """Part that such a current leaves at least."""
-        return self.left(self.voltages - self.fit(there))
+        return self.part_of_swing(self.voltages - self.fit(there))
 
 
 class _Rivals:
@@ -179,7 +179,7 @@ def _opinion_on_a_unit(currents: _UnexplainedCurrents, rivals: _Rivals) -> Opini
     known, names, parts, sure = currents.known, currents.names, currents.parts, currents.sure
     top = int(sure.argmax())
     beside = min((x for name, x in rivals.left.items() if name != known[top].bus), default=1.0)
-    rest = currents.left(currents.voltages - currents.effects[top])
+    rest = currents.part_of_swing(currents.voltages - currents.effects[top])
     most = sure[top] > 0 and sure[top] ** 2 >= _SHARE * (sure**2).sum()
     alone = most and max([*parts[:top], *parts[top + 1 :], 0.0]) < _CONTRARY
     if not alone:

@@ -5,7 +5,7 @@ from html import escape
 
 import numpy as np
 
-from orchestrator.core.errors import counted
+from orchestrator.core.errors import number_of
 from orchestrator.output.report.html.charts import ChartCurve, legend, line_chart
 from orchestrator.output.report.html.elements import SHADES, Figures, colour, document
 from orchestrator.output.report.html.network_map import network_map
@@ -28,7 +28,7 @@ def source_page(measured: Measurements, found: list[Located]) -> str:
     ]
     return document(
         f"Oscillations in {measured.label}",
-        counted(len(measured.places), "place"),
+        number_of(len(measured.places), "place"),
         f'<div class="findings"><ul>{findings or "<li>No oscillation was found.</li>"}</ul></div>',
         [*content, ("Spectrum", _spectrum(measured, found, figures))],
     )

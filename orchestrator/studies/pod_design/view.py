@@ -263,7 +263,7 @@ def _margins_json(m: Margins) -> dict[str, Any]:
 
 
 def _refinement_json(d: PodDesign) -> dict[str, Any]:
-    def placed(p: Placed, **least: float | None) -> dict[str, Any]:
+    def placed_mode(p: Placed, **least: float | None) -> dict[str, Any]:
         return {
             "K": p.setting.gain,
             "mode": _complex(p.eigenvalue),
@@ -277,16 +277,16 @@ def _refinement_json(d: PodDesign) -> dict[str, Any]:
     refinement = d.refinement
     assert refinement is not None
     return {
-        "designed": filters(d.filters) | placed(d.designed),
+        "designed": filters(d.filters) | placed_mode(d.designed),
         "sweeps": [
             {
                 "lead_lag": s.why,
                 **filters(s.filters),
                 "points": [
-                    placed(p, least_damping_ratio=least)
+                    placed_mode(p, least_damping_ratio=least)
                     for p, least in zip_longest(s.points, s.least)
                 ],
-                "chosen": placed(s.chosen, least_damping_ratio=s.chosen_least),
+                "chosen": placed_mode(s.chosen, least_damping_ratio=s.chosen_least),
                 "unstable_gains": list(s.unstable),
             }
             for s in refinement.sweeps

@@ -10,8 +10,8 @@ from orchestrator.cases.form.given import (
     Time,
     case_values,
     in_seconds,
-    kept,
     parameter_files,
+    path_of_given,
 )
 from orchestrator.cases.form.parameter_files import ParameterFile
 from orchestrator.cases.form.schema import Value
@@ -22,7 +22,7 @@ from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ
 POINTS_FILE = FieldKind(
     "FILE",
     Path,
-    lambda given, argument: None if given is None else kept(given, "points.csv", argument),
+    lambda given, argument: None if given is None else path_of_given(given, "points.csv", argument),
 )
 ANYTHING = FieldKind("", str, lambda given, _: given)  # checked where it is used
 _VALUES = FieldKind("", str, case_values)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection
 from typing import Any
 
 from orchestrator.cases.networks.branch_limits import Loading
-from orchestrator.core.errors import counted
+from orchestrator.core.errors import number_of
 from orchestrator.output.report.table import Column, ColumnTable
 from orchestrator.studies.screening.study import ScreenedItem
 from orchestrator.studies.screening.summary import Summary
@@ -156,7 +156,7 @@ def _voltages_in_words(summary: Summary) -> str:
 def _without_flow(summary: Summary) -> str:
     """Say of how many items that is not known; "" where it is known of all."""
     number = sum(not item.record.has_flow for item in summary.result.items)
-    return f", except for {counted(number, 'item')} not judged" if number else ""
+    return f", except for {number_of(number, 'item')} not judged" if number else ""
 
 
 def _has_bands(summary: Summary) -> bool:

@@ -130,7 +130,7 @@ class Summary:
         return True if all(item.record.stable for item in self.result.items) else None
 
     @property
-    def counted(self) -> int:
+    def counted_items(self) -> int:
         return sum(item.record.counted for item in self.result.items)
 
     @property

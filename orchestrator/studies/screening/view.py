@@ -12,7 +12,7 @@ import numpy as np
 from rich.markup import escape as escape_markup
 
 from orchestrator.cases.settings.layers import joined_values
-from orchestrator.core.errors import Problem, counted, few
+from orchestrator.core.errors import Problem, few, number_of
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder, write_text
 from orchestrator.core.truth import NoTruth
@@ -407,7 +407,7 @@ def as_json(summary: Summary) -> dict[str, Any]:
         "items": len(result.items),
         "complete": result.complete,
         "stable": summary.stable,
-        "counted_at_all_frequencies": summary.counted,
+        "counted_at_all_frequencies": summary.counted_items,
         "slowest_growth_counted": summary.slowest,
         "nothing_restores": [
             _where(item) | {"zero_eigenvalues": item.record.zeros} for item in summary.free
@@ -467,8 +467,8 @@ def _page(summary: Summary) -> str:
         content.append(("Not computed", shown.html()))
     title = f"{plan.case.table.title or plan.case.name}: screening"
     points, outages = (
-        counted(len(plan.points), "operating point"),
-        counted(len(plan.outages) - 1, "outage"),
+        number_of(len(plan.points), "operating point"),
+        number_of(len(plan.outages) - 1, "outage"),
     )
     kind = f"{plan.prepared.title}, {points}, {outages}"
     shade, sure = SHADES[summary.stable], what_was_counted(summary)

@@ -181,7 +181,7 @@ def verdict_of(summary: Summary) -> VerdictSentence:
     text = not_judged(summary)
     missing = [text] if text else []
     missing += [f"{left} not computed yet"] if left else []
-    uncounted = computed - summary.counted
+    uncounted = computed - summary.counted_items
     if uncounted:
         wanted = summary.result.plan.wanted
         missing.append(
@@ -218,7 +218,7 @@ def what_was_counted(summary: Summary) -> str:
         f"below {100 * wanted.damping:g} % damping, of the "
         f"{_what_was_linearised(summary)}: found anew at {searched} of {computed} points and outages"
         f"{others}. Whether something grows at other frequencies was counted at "
-        f"{summary.counted} of {computed}{large}."
+        f"{summary.counted_items} of {computed}{large}."
     )
 
 

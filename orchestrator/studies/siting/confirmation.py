@@ -192,7 +192,7 @@ def _with_pod(
 
 def _predicted(master: Master, model: ComponentLinearization, bus: str, seen: SeenMode) -> complex:
     """λ with a component, whose answer is that at λ itself."""
-    return seen.mode.eigenvalue + seen.settled(bus, lambda at: response_of(master, model, at))
+    return seen.mode.eigenvalue + seen.final_shift(bus, lambda at: response_of(master, model, at))
 
 
 def tuned_setting(

@@ -13,7 +13,7 @@ from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder, write_text
 from orchestrator.output.report.notebook import page
 from orchestrator.output.report.table import ShownTable
-from orchestrator.output.results.lock import held
+from orchestrator.output.results.lock import hold_folder
 from orchestrator.output.results.staging import new_run_id, staged
 from orchestrator.output.results.storage import save_json, save_table
 from orchestrator.studies.modes.modes import ModesResult
@@ -112,7 +112,7 @@ class PlaceRanking(ABC, Generic[Ranked]):
     def save(self, folder: str | Path) -> list[Path]:
         """Write figures as JSON and CSV, and the page, into a folder; returns their paths."""
         place = made_folder(folder, "folder")
-        with held(place), staged(place, new_run_id()) as staging:
+        with hold_folder(place), staged(place, new_run_id()) as staging:
             save_json(self.as_json(), staging / self.json_name)
             save_table(self.rows(), staging / self.table_name)
             write_text(staging / self.page_name, self.page_text())

@@ -49,7 +49,7 @@ def name_at(bus: str) -> str:
     return f"site_{bus}"
 
 
-def placed(case: Case, device: ComponentTable, buses: Sequence[str]) -> Case:
+def with_devices(case: Case, device: ComponentTable, buses: Sequence[str]) -> Case:
     table = case.table
     further: Mapping[str, ComponentTable] = {
         name_at(b): device.model_copy(update={"bus": b}) for b in buses

@@ -37,7 +37,7 @@ class SeenMode:
         at_mode = np.linalg.solve(np.eye(2) - response @ self.impedance[bus], response)
         return complex(self.drive[bus] @ at_mode @ self.shown[bus])
 
-    def settled(self, bus: str, response: Callable[[complex], Vector]) -> complex:
+    def final_shift(self, bus: str, response: Callable[[complex], Vector]) -> complex:
         """The same of a device that moves the mode farther: it answers at the mode where that is then. Of one that
         moves it by more than the mode's own size, the shift by its answer at the mode as it was."""
         start = eigenvalue = self.mode.eigenvalue

@@ -315,14 +315,14 @@ def _of_foreign(
     there = active[intact.name][intact.modes[0].label]
     bus = max(there, key=lambda name: abs(there[name].change))
     device = placing.foreign(Path(request.device), request.binding_file, request.rating)
-    prepared = _prepared(placing.placed(case, device, [bus]), request, scenario)
+    prepared = _prepared(placing.with_devices(case, device, [bus]), request, scenario)
     with running(prepared) as master:
         find_operating_point(master)
         model = Blocks(master).components[placing.name_at(bus)]
 
         def shift(at: Situation, other: str, seen: SeenMode) -> complex:
             ahead = cmath.phase(at.voltages[other] / intact.voltages[bus])
-            return seen.settled(
+            return seen.final_shift(
                 other,
                 lambda there: placing.turned(placing.response_of(master, model, there), ahead),
             )
@@ -350,7 +350,7 @@ def _with_confirmations(
     )
     found = []
     for k, bus in enumerate(result.ranking[: request.confirm]):
-        prepared = _prepared(placing.placed(result.case, device, [bus]), request, scenario)
+        prepared = _prepared(placing.with_devices(result.case, device, [bus]), request, scenario)
         found.append(
             confirmed(prepared, bus, seen, request.frequencies, request.controller, request.gain)
         )

@@ -98,7 +98,7 @@ def unit(result: SiteResult, times: str = "1") -> str:
     return f"points of damping by {times} {quantity}{phase}"
 
 
-def shown(result: SiteResult, damping: float) -> str:
+def shift_text(result: SiteResult, damping: float) -> str:
     """A shift for people, in the unit ``unit(result, "100")``."""
     return f"{damping * (1 if result.request.is_foreign else _PEOPLE):+.3g}"
 
@@ -121,7 +121,7 @@ def answer(result: SiteResult) -> str:
         return _best_confirmed(result, among)
     others = ", ".join(f"{bus} {100 * result.least(bus)[0] / most:.0f} %" for bus in best[1:])
     return (
-        f"{best[0]} is the best place for {device_title(result)}{among}: {shown(result, most)} "
+        f"{best[0]} is the best place for {device_title(result)}{among}: {shift_text(result, most)} "
         f"{unit(result, '100')}, for the least damped mode{after} ({_called(mode)})"
         + (f"; of that {others}" if others else "")
     )
@@ -134,7 +134,7 @@ def _best_confirmed(result: SiteResult, among: str) -> str:
     pod = "" if result.request.controller is None else " and its POD"
     then = ", ".join(f"{one.bus} {one.damping:.2f} %" for one in others)
     by_support = sorted(result.ranking, key=lambda bus: -result.least(bus)[0])
-    small = ", ".join(f"{bus} {shown(result, result.least(bus)[0])}" for bus in by_support[:3])
+    small = ", ".join(f"{bus} {shift_text(result, result.least(bus)[0])}" for bus in by_support[:3])
     order = f"the order of the {len(result.confirmations)} places that coupled FMUs computed"
     steps = f"{seen.mode.damping_percent:.2f} % → {first.damping:.2f} %"
     mode = f"the mode {title_of_mode(seen.label, seen.mode)}, the least damped without it"
@@ -435,7 +435,7 @@ def _cells(result: SiteResult, bus: str) -> list[str]:
     shifts = (
         result.shifts[DEVICE][result.intact.name][seen.label][bus] for seen in result.intact.modes
     )
-    return ["hardly" if one.hardly else shown(result, one.damping) for one in shifts]
+    return ["hardly" if one.hardly else shift_text(result, one.damping) for one in shifts]
 
 
 def _page(result: SiteResult) -> str:
@@ -460,7 +460,8 @@ def _page(result: SiteResult) -> str:
         for at in outages:
             mode = at.modes[0]
             there = ", ".join(
-                f"{bus} {shown(result, x)}" for bus, x in _best(result, at.name, mode.label).items()
+                f"{bus} {shift_text(result, x)}"
+                for bus, x in _best(result, at.name, mode.label).items()
             )
             best.append(
                 [
@@ -513,7 +514,7 @@ def _map(result: SiteResult, seen: SeenMode, figures: Figures) -> str:
     branches = [(line.from_bus, line.to_bus) for line in network.lines]
     branches += [(x.buses[0], bus) for x in network.transformers for bus in x.buses[1:]]
     texts = {
-        bus: f"{result.prepared.names.of(bus)}: {shown(result, one.damping)} {unit(result, '100')}"
+        bus: f"{result.prepared.names.of(bus)}: {shift_text(result, one.damping)} {unit(result, '100')}"
         for bus, one in shifts.items()
     }
     who = ", ".join(share_text(entry) for entry in list(seen.mode.by_component.items())[:3])

@@ -197,13 +197,13 @@ def _attributes(samples: Samples) -> dict[str, Any]:
             "overrides": json.dumps(result.plan.overrides),
             "models": result.plan.scenarios[0].models or "",
             "basis": json.dumps(result.plan.scenarios[0].basis),
-            "warned": json.dumps([*_asked(samples), *warned(samples)]),
+            "warned": json.dumps([*_questions_of(samples), *warned(samples)]),
             "frequency_range_hz": [low, high],
         }
     )
 
 
-def _asked(samples: Samples) -> dict[str, None]:
+def _questions_of(samples: Samples) -> dict[str, None]:
     return {
         str(question): None
         for sweep in samples.result.scenarios
@@ -213,7 +213,7 @@ def _asked(samples: Samples) -> dict[str, None]:
 
 def warned(samples: Samples) -> list[str]:
     """Each kind of warning once, with the number of points that have it."""
-    asked = _asked(samples)  # said already, before the sweep
+    asked = _questions_of(samples)  # said already, before the sweep
     points = [record for sweep in samples.result.scenarios for record in sweep.points.values()]
     kinds = kinds_of(
         (record, (text for text in record.warnings if text not in asked)) for record in points

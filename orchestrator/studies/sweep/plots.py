@@ -122,7 +122,7 @@ def axis_label(axis: Any) -> str:
     return f"{axis.key} [{axis.unit}]" if axis.unit else str(axis.key)
 
 
-def _named(samples: Samples) -> list[tuple[int, ScenarioSweep, Trajectory, Curve]]:
+def _named_curves(samples: Samples) -> list[tuple[int, ScenarioSweep, Trajectory, Curve]]:
     return [
         (k, sweep, trajectory, samples.of(sweep, trajectory))
         for k, sweep in enumerate(samples.result.scenarios)
@@ -169,7 +169,7 @@ def _plot_panels(
     *,
     sharey: bool = False,
 ) -> bool:
-    curves = _named(samples)
+    curves = _named_curves(samples)
     if not curves or not panels:
         return False
     with mpl.rc_context(STYLE):

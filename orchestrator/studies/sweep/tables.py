@@ -5,7 +5,7 @@ import math
 from rich.markup import escape
 from rich.table import Table
 
-from orchestrator.core.errors import counted
+from orchestrator.core.errors import number_of
 from orchestrator.output.report.tables import make_table
 from orchestrator.studies.sweep.axes import grid_places
 from orchestrator.studies.sweep.dataset import Samples, warned
@@ -126,7 +126,9 @@ def remarks(samples: Samples) -> list[str]:
     texts += [text for limit in result.limits for text in limit.remarks]
     failures = list(result.failures())
     if failures:
-        texts.append(f"{counted(len(failures), 'point')} of {result.plan.number_of_points} failed:")
+        texts.append(
+            f"{number_of(len(failures), 'point')} of {result.plan.number_of_points} failed:"
+        )
         texts += [
             f"  {sweep.prepared.name}, {place_text(samples, place)}: {error}"
             for sweep, place, error in failures[:_FAILURES_SHOWN]
@@ -149,7 +151,7 @@ def remarks(samples: Samples) -> list[str]:
     texts += [f"… and {more} more beginnings, marked 'broken' in sweep.csv"] if more > 0 else []
     if result.refined and not result.limits:
         texts.append(
-            f"{counted(result.refined, 'point')} between the values asked for served to recognise modes "
+            f"{number_of(result.refined, 'point')} between the values asked for served to recognise modes "
             "('refined' in sweep.csv)"
         )
     return [*texts, *warned(samples)]

@@ -7,7 +7,7 @@ from html import escape
 
 from orchestrator.core.safe_files import file_hash
 from orchestrator.output.report.html.charts import ChartCurve, legend, line_chart, thinned
-from orchestrator.output.report.html.elements import Figures, colour, document, listed, table
+from orchestrator.output.report.html.elements import Figures, bullet_list, colour, document, table
 from orchestrator.studies.validation.event import EventComparison
 from orchestrator.studies.validation.figures import SIGNALS
 from orchestrator.studies.validation.limits import LimitVerdict
@@ -86,7 +86,7 @@ def _event(one: EventComparison, figures: Figures, others: Sequence[EventCompari
             _recording(one),
             *_charts(one, figures, others),
             _errors(one),
-            listed(map(sentence, one.questions)),
+            bullet_list(map(sentence, one.questions)),
         ]
     )
 
@@ -186,7 +186,7 @@ def _not_judged(result: ValidationResult) -> str:
         texts.append("No parameter was fitted.")
     if not result.request.explain:
         texts.append("No cause of the errors was looked for.")
-    return listed(texts)
+    return bullet_list(texts)
 
 
 def _left_open(result: ValidationResult) -> Iterator[str]:

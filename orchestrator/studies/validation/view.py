@@ -10,7 +10,7 @@ from rich.console import RenderableType
 from rich.markup import escape
 
 from orchestrator.core.asked import whole_number
-from orchestrator.core.errors import counted
+from orchestrator.core.errors import number_of
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder
 from orchestrator.output.report.notebook import page
@@ -176,7 +176,7 @@ class Validation:
         return pd.DataFrame(columns, index=pd.Index(recording.times + recording.begin, name="time"))
 
     def __repr__(self) -> str:
-        many = counted(len(self.result.comparisons), "recording")
+        many = number_of(len(self.result.comparisons), "recording")
         return f"<Validation of {self.result.request.device.name} by {many}: {self.verdict or 'no limits'}>"
 
     def _repr_html_(self) -> str:

@@ -150,14 +150,14 @@ def test_a_mode_is_followed_along_the_gains_to_what_the_device_brings(files, mon
     now = (
         f"({same.damping_percent:.2f} %, and the least damped now {weakest.damping_percent:.2f} %)"
     )
-    (sentence,) = beside.told([dispatch, pod])
+    (sentence,) = beside.sentences_beside([dispatch, pod])
     assert sentence.endswith(now)
 
     def meets(*_, **__):
         raise ModesMeetError(1j, 0.7, 1.0)
 
     monkeypatch.setattr(beside.continuation, "follow_along", meets)
-    (sentence,) = beside.told([dispatch, pod])
+    (sentence,) = beside.sentences_beside([dispatch, pod])
     least = weakest.damping_percent - min(mode.damping_percent for mode in dispatch.modes)
     assert (
         f"POD-P at least {least:+.2f} points (least damped: {weakest.damping_percent:.2f} %)"
@@ -170,17 +170,17 @@ def test_what_the_device_brings_is_told_apart_from_the_dispatch(files):
     case, new = made(files)
     dispatch, converter = map(compute_modes, case.prepare(["dispatch", "converter"]))
     least = [min(mode.damping_percent for mode in result.modes) for result in (dispatch, converter)]
-    (sentence,) = beside.told([dispatch, converter])
+    (sentence,) = beside.sentences_beside([dispatch, converter])
     assert (
         f"{least[0]:.2f} %), at the same power flow: Converter {least[1] - least[0]:+.2f} points"
         in sentence
     )
-    assert list(beside.told([converter])) == [
+    assert list(beside.sentences_beside([converter])) == [
         "What the change of power flow alone does: --scenario dispatch beside"
     ]
     (moved,) = map(compute_modes, case.prepare(["converter"], {"gfor.P_0": 0.5}))
     assert "Converter: not known, as its power flow is another one" in "".join(
-        beside.told([dispatch, moved])
+        beside.sentences_beside([dispatch, moved])
     )
     # The same as a negative load of the network, which is a constant current there, without any device
     fed = 100 * dispatch.prepared.power_flow.powers["injection"]

@@ -12,7 +12,7 @@ import pytest
 
 import orchestrator as gfor
 from orchestrator.cases.case import BUILT_IN
-from orchestrator.cases.form.given import kept
+from orchestrator.cases.form.given import path_of_given
 from orchestrator.core.errors import CaseError, InputError
 
 
@@ -61,7 +61,9 @@ def test_a_gap_in_a_table_of_points_is_asked_about():
     with pytest.warns(
         UserWarning, match="question: points: load: the case's value is taken at NaN"
     ):
-        kept(pd.DataFrame({"load": [np.nan, 0.9], "hours": [1.0, 2.0]}), "points.csv", "points")
+        path_of_given(
+            pd.DataFrame({"load": [np.nan, 0.9], "hours": [1.0, 2.0]}), "points.csv", "points"
+        )
 
 
 def test_a_point_without_values_is_the_case_as_it_is():

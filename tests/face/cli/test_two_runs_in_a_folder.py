@@ -14,7 +14,7 @@ import xarray as xr
 from orchestrator.core.errors import InputError
 from orchestrator.face.api.case import load
 from orchestrator.face.cli import run as command
-from orchestrator.output.results.lock import LOCK, held
+from orchestrator.output.results.lock import LOCK, hold_folder
 from orchestrator.systems.coupling.observers import Progress
 from tests.face.cli.test_resume import checkpoints_in
 
@@ -95,13 +95,13 @@ def test_a_killed_run_leaves_its_folder_to_the_next(gfor, live):
 
 def test_the_lock_is_given_back_after_an_error(tmp_path):
     with (
-        held(tmp_path),
+        hold_folder(tmp_path),
         pytest.raises(InputError, match=f"process {os.getpid()} works in this folder"),
     ):
-        held(tmp_path).__enter__()
-    with pytest.raises(ZeroDivisionError), held(tmp_path):
+        hold_folder(tmp_path).__enter__()
+    with pytest.raises(ZeroDivisionError), hold_folder(tmp_path):
         1 / 0  # noqa: B018
-    with held(tmp_path):
+    with hold_folder(tmp_path):
         assert (tmp_path / LOCK).exists()
     assert list(tmp_path.iterdir()) == []
 
@@ -179,7 +179,7 @@ def test_other_commands_hold_the_folder_of_their_results_as_well(gfor, tmp_path)
         "modes": ("modes", "infinite_bus", "--scenario", "dip"),
         "sweep": ("sweep", "infinite_bus", "--scenario", "dip", "--vary", "gfor.P_0=0.4,0.6"),
     }
-    with held(tmp_path):
+    with hold_folder(tmp_path):
         for name, words in commands.items():
             code, _, error = gfor(*words, "--out", tmp_path)
             assert code == 2, name
@@ -189,7 +189,7 @@ def test_other_commands_hold_the_folder_of_their_results_as_well(gfor, tmp_path)
 
 def test_python_holds_the_folder_of_checkpoints_and_points(tmp_path):
     case = load("infinite_bus")
-    with held(tmp_path):
+    with hold_folder(tmp_path):
         with pytest.raises(InputError, match="works in this folder"):
             case.scenario("dip").run(stop=0.1, checkpoints=tmp_path)
         with pytest.raises(InputError, match="works in this folder"):

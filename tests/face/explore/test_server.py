@@ -135,7 +135,7 @@ def test_it_ends_a_while_after_its_last_page_was_closed():
     told = found.opened("p")
     time.sleep(1.2)
     assert serving.is_alive()  # as long as one is open
-    found.left("p", told)
+    found.close_page("p", told)
     serving.join(60)
     assert not serving.is_alive()
 
@@ -146,13 +146,13 @@ def test_it_waits_for_its_first_page():
     serving.start()
     time.sleep(0.8)
     assert serving.is_alive()
-    found.left("p", queue.SimpleQueue())
+    found.close_page("p", queue.SimpleQueue())
     serving.join(60)
 
 
 def test_a_page_that_comes_again_is_answered(explorer):
     """Its stream of events broke off; the browser opens another by itself."""
-    explorer.left("p", explorer.opened("p"))
+    explorer.close_page("p", explorer.opened("p"))
     explorer.opened("p")
     assert "answer" in explorer.answer("p", {"ask": "open", "number": 1.0})
 

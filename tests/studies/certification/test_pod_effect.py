@@ -86,7 +86,7 @@ def test_what_counts_is_where_the_mode_is_damped_least():
 
 def test_without_a_switch_it_is_not_known():
     (v,) = judged(replace(point(), off=None), controllers=replace(CONTROLLERS, can_be_off=False))
-    assert not v.judged
+    assert not v.is_judged
     assert "no switch turns it off" in v.unknown
 
 

@@ -14,7 +14,7 @@ from orchestrator.studies.coordinated_design.open_loops import OpenLoops, PodPla
 from orchestrator.studies.coordinated_design.point import PointModes
 from orchestrator.studies.coordinated_design.search import SettingSearch
 from orchestrator.studies.coordinated_design.settings import PodGroup, SettingSpace
-from orchestrator.studies.coordinated_design.verdict import PointsVerdict, judged
+from orchestrator.studies.coordinated_design.verdict import PointsVerdict, judge_points
 from orchestrator.studies.coordinated_design.words import verdict_of, verdict_sentence
 from orchestrator.studies.operating_points.item import Status
 from orchestrator.studies.operating_points.outages import Outage
@@ -147,7 +147,7 @@ def spectrum(*pairs, who=("sg7", "sg1, sg3", "sg5"), named=None):
 
 
 def verdict(before, after, aim, apart=(), names=()):
-    points = judged(WHERE, [before], [after], aim, {}, {0: apart})
+    points = judge_points(WHERE, [before], [after], aim, {}, {0: apart})
     return PointsVerdict(list(points), WANTED, LARGEST, names=names)
 
 

@@ -8,7 +8,7 @@ from orchestrator.studies.coordinated_design import view
 from orchestrator.studies.coordinated_design.objective import Aim
 from orchestrator.studies.coordinated_design.open_loops import OpenLoops, PodPlace
 from orchestrator.studies.coordinated_design.point import PointModes
-from orchestrator.studies.coordinated_design.verdict import PointsVerdict, judged
+from orchestrator.studies.coordinated_design.verdict import PointsVerdict, judge_points
 from orchestrator.studies.coordinated_design.words import remarks, verdict_sentence
 from orchestrator.studies.operating_points.item import Status
 from orchestrator.studies.operating_points.outages import Outage
@@ -28,7 +28,7 @@ def test_the_least_damping_of_all_points_is_no_gain_at_each():
     """Noon gains from 3 to 6.2 %. At night the swing gains and the local mode beside it falls to 6.5 %."""
     before = [modes((1.0, 0.03)), modes((1.0, 0.10), (1.3, 0.12))]
     after = [modes((1.0, 0.062)), modes((1.0, 0.20), (1.3, 0.065))]
-    found = PointsVerdict(list(judged(WHERE, before, after, Aim((), 0.05), {})), None)
+    found = PointsVerdict(list(judge_points(WHERE, before, after, Aim((), 0.05), {})), None)
     said = verdict_sentence(found)
     assert found.met is True
     assert [point.point.name for point in found.lowered] == ["night"]
@@ -100,7 +100,7 @@ def test_a_mode_that_the_controllers_move_out_of_the_range_still_counts(asked):
     assert len(in_range(after.values)) == 1
     assert 0.05 < zeta < 0.08
     setting = {PLACE: PodSetting(0.6, NO_COMPENSATION)} if asked else None
-    points = list(judged(WHERE[:1], [before], [after], Aim((), 0.05), {}, setting=setting))
+    points = list(judge_points(WHERE[:1], [before], [after], Aim((), 0.05), {}, setting=setting))
     found = PointsVerdict(points, 0.08)
     if not asked:
         assert found.met is True  # what two lists of a range say
@@ -124,6 +124,6 @@ def test_a_mode_that_was_outside_before_is_none_that_left():
     loops = OpenLoops.of(A, U, V, [PLACE], ("a", "b", "c", "d"))
     before, after = spectrum(loops, 0.0), spectrum(loops, 0.3)
     setting = {PLACE: PodSetting(0.3, NO_COMPENSATION)}
-    (point,) = judged(WHERE[:1], [before], [after], Aim((), 0.05), {}, setting=setting)
+    (point,) = judge_points(WHERE[:1], [before], [after], Aim((), 0.05), {}, setting=setting)
     assert point.left == ()
     assert point.target.frequency_hz == pytest.approx(1.0, abs=0.02)

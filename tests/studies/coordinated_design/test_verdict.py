@@ -8,7 +8,7 @@ import pytest
 from orchestrator.studies.coordinated_design import view
 from orchestrator.studies.coordinated_design.objective import Aim
 from orchestrator.studies.coordinated_design.point import PointModes
-from orchestrator.studies.coordinated_design.verdict import PointsVerdict, judged, least_of
+from orchestrator.studies.coordinated_design.verdict import PointsVerdict, judge_points, least_of
 from orchestrator.studies.coordinated_design.words import verdict_sentence
 from orchestrator.studies.operating_points.item import Status
 from orchestrator.studies.operating_points.outages import Outage
@@ -30,7 +30,7 @@ def modes(*pairs):
 
 def verdict(before, after, wanted, least=0.05):
     return PointsVerdict(
-        list(judged(WHERE, [modes(*before)], [modes(*after)], Aim((), least), {})), wanted
+        list(judge_points(WHERE, [modes(*before)], [modes(*after)], Aim((), least), {})), wanted
     )
 
 
@@ -67,7 +67,9 @@ def test_a_mode_that_gained_two_points_of_damping_was_moved(after, unmoved):
 
 @pytest.mark.parametrize("thin", [None, 0.0957, 0.12])
 def test_a_setting_that_more_gain_spoils_has_no_margin(thin):
-    points = list(judged(WHERE, [modes((1.0, 0.05))], [modes((1.0, 0.1001))], Aim((), 0.05), {}))
+    points = list(
+        judge_points(WHERE, [modes((1.0, 0.05))], [modes((1.0, 0.1001))], Aim((), 0.05), {})
+    )
     said = verdict_sentence(PointsVerdict(points, 0.1, thin=thin))
     assert said.startswith("REACHED: 10 %")
     assert ("; no margin: 9.57 % with gains of × 1.2" in said) is (thin == 0.0957)

@@ -29,7 +29,7 @@ def test_nothing_exchanged_is_the_case_itself():
 def test_the_stand_in_neither_damps_nor_excites_a_swing():
     """How fast it follows the voltage's angle, from 5 to 20 Hz, moves the damping of 0.5 Hz by 0.1 points at most."""
     case = load_case("two_area")
-    place = places_of(case.placed("gfor"), "grid")["gfor"]
+    place = places_of(case.tables_and_plans("gfor"), "grid")["gfor"]
     found = []
     for frequency in (5.0, 20.0):
         table = stand_in_at(place, "static_generation")

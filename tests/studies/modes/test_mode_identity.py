@@ -17,7 +17,7 @@ from orchestrator.linear.spectra.mode_names import name_modes
 from orchestrator.linear.spectra.modes import Mode, find_modes, make_mode
 from orchestrator.studies.modes import mode_identity
 from orchestrator.studies.modes.all_modes import compute_all_modes
-from orchestrator.studies.modes.mode_identity import NamedSystem, settled
+from orchestrator.studies.modes.mode_identity import NamedSystem, settle_names
 from orchestrator.studies.modes.modes import compute_modes, modes_json
 from orchestrator.systems.coupling.system import ComponentPlan, System
 from tests.support.scenarios import prepare_one
@@ -76,7 +76,7 @@ def test_a_tie_goes_to_the_mode_that_it_was(a, b, place):
     on = scenario("on", two_masses(a, b, 3.0))
     assert on.naming.named == {}
     assert on.naming.doubts[0].startswith("no mode is named 'mine': those at ")
-    found = settled(on, never, {"off": scenario("off", two_masses(a, b, 0.0))})
+    found = settle_names(on, never, {"off": scenario("off", two_masses(a, b, 0.0))})
     low, high = sorted(mode.frequency_hz for mode in on.modes)
     assert hertz_of(found) == {"mine": (low, high)[place]}
     assert found.naming.reasons == {}
@@ -85,7 +85,7 @@ def test_a_tie_goes_to_the_mode_that_it_was(a, b, place):
 def test_order_rotation_and_scaling_change_no_name():
     """Eigenvectors of any length and angle, in any order, of states in any order."""
     random = np.random.default_rng(7)
-    wanted = hertz_of(settled(scenario("on", FAR), never, {"off": scenario("off", OFF)}))
+    wanted = hertz_of(settle_names(scenario("on", FAR), never, {"off": scenario("off", OFF)}))
     assert wanted
     for _ in range(20):
         order = random.permutation(4)
@@ -103,7 +103,7 @@ def test_order_rotation_and_scaling_change_no_name():
                 for i, k in enumerate(above)
             ]
             systems.append(scenario(name, turned, modes=modes, names=names))
-        assert hertz_of(settled(systems[1], never, {"off": systems[0]})) == pytest.approx(
+        assert hertz_of(settle_names(systems[1], never, {"off": systems[0]})) == pytest.approx(
             wanted, rel=1e-9
         )
 
@@ -111,7 +111,7 @@ def test_order_rotation_and_scaling_change_no_name():
 def test_a_clear_shape_is_followed_from_nowhere():
     clear = scenario("on", two_masses(1.0, 1.2, 0.02))
     assert clear.naming.contested == ()
-    assert settled(clear, never, {}) is clear
+    assert settle_names(clear, never, {}) is clear
 
 
 @pytest.mark.parametrize("change", ["states", "another operating point"])
@@ -122,7 +122,7 @@ def test_where_no_way_leads_a_tie_stays_free(change):
         if change == "states"
         else scenario("off", OFF, states=dict.fromkeys(STATES, 0.01))
     )
-    found = settled(on, never, {"off": off})
+    found = settle_names(on, never, {"off": off})
     assert found.naming.named == {}
     assert "fit it about equally" in found.naming.doubts[0]
 
@@ -143,7 +143,7 @@ def test_modes_that_merge_on_the_way_are_told_with_the_place():
         for n, r in (("off", 0.02), ("on", 2.02))
     )
     assert hertz_of(off) == {"mine": pytest.approx(6.0 / (2 * np.pi), rel=1e-3)}
-    found = settled(on, never, {"off": off})
+    found = settle_names(on, never, {"off": off})
     assert found.naming.named == {}
     assert "meets another one 49% of the way from there" in found.naming.reasons["mine"]
 
@@ -152,7 +152,9 @@ def test_two_names_never_go_to_one_mode():
     """'other' is the upper mode by its shape; following may not take it away."""
     measures = OF_A | {"other": lambda mode: float(mode.frequency_hz > 1.5)}
     on = scenario("on", FAR, measures=measures)
-    found = settled(on, never, {"off": scenario("off", two_masses(1.2, 1.0, 0.0), measures=OF_A)})
+    found = settle_names(
+        on, never, {"off": scenario("off", two_masses(1.2, 1.0, 0.0), measures=OF_A)}
+    )
     assert list(found.naming.named) == ["other"]
     assert found.naming.reasons["mine"].endswith("which has another name")
 
@@ -226,20 +228,22 @@ def test_a_clear_shape_that_a_damping_controller_made_leaves_the_name_free(monke
     monkeypatch.setattr(mode_identity, "is_ours", lambda _: True)
     off, on = moved()
     asked = []
-    found = settled(
+    found = settle_names(
         with_part(on, 100.0), never, {}, undamped=lambda gains: asked.append(gains) or off
     )
     assert asked == [{"dev.pod_p.K": 0.0}]
     assert found.naming.named == {}
     assert "exchanges its nature with the one of 2.6" in found.naming.reasons["mine"]
-    assert settled(with_part(on, 0.0), never, {}, undamped=never) is on  # the controller is off
+    assert (
+        settle_names(with_part(on, 0.0), never, {}, undamped=never) is on
+    )  # the controller is off
 
 
 @pytest.mark.parametrize("a", [1.05, 1.5])
 def test_a_clear_shape_that_stays_keeps_its_name_without_a_word(a):
     """With hardly a spring the frequencies cross, and each mode remains what it was."""
     off, on = scenario("off", two_masses(1.0, 1.2, 0.01)), scenario("on", two_masses(a, 1.2, 0.01))
-    found = settled(with_part(on, 100.0), never, {}, undamped=lambda _: off)
+    found = settle_names(with_part(on, 100.0), never, {}, undamped=lambda _: off)
     assert (hertz_of(found), found.naming.doubts) == (hertz_of(on), ())
 
 
@@ -250,7 +254,7 @@ def test_a_value_of_a_foreign_fmu_is_followed_and_one_of_ours_has_its_shape(monk
     monkeypatch.setattr(mode_identity, "is_isolated", lambda *_: True)
     off, on = moved()
     with_part(off, 0.0, path="vendor", variables=("gain",))
-    found = settled(
+    found = settle_names(
         with_part(on, 40.0, path="vendor", variables=("gain",), earlier=off), lambda _: off, {}
     )
     assert hertz_of(found) == (hertz_of(on) if ours else {})
@@ -261,7 +265,7 @@ def test_a_value_of_a_foreign_fmu_is_followed_and_one_of_ours_has_its_shape(monk
 
 def test_scenarios_that_are_shown_together_tell_where_modes_exchanged_their_nature():
     off, on = moved()
-    found = settled(on, never, {"off": off})
+    found = settle_names(on, never, {"off": off})
     assert hertz_of(found) == hertz_of(on)
     (told,) = found.naming.doubts
     assert told.startswith("'mine', by its shape, may be another mode than there: the mode of 1.0")
@@ -290,7 +294,7 @@ def test_fitted_models_of_other_states_are_compared_by_those_that_both_have(monk
             return off.prepared
 
         on.prepared.beside = beside
-        found = settled(on, lambda _, off=off: off, {})
+        found = settle_names(on, lambda _, off=off: off, {})
         assert ("mine" in found.naming.named) is known
         assert all(0 < step["dev.gain"] < 40 for step in steps if step)
         assert len([step for step in steps if step]) <= 7

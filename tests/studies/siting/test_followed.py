@@ -5,7 +5,7 @@ import pytest
 
 from orchestrator.linear.spectra.modes import damping_percent
 from orchestrator.studies.modes.modes import compute_modes
-from orchestrator.studies.siting.placing import converter, placed
+from orchestrator.studies.siting.placing import converter, with_devices
 from orchestrator.studies.siting.study import SiteRequest, find_sites
 from tests.studies.screening.five_machines import five_machines
 
@@ -24,7 +24,7 @@ def grown(result):
     value = result.intact.modes[0].mode.eigenvalue
     for rating in RATINGS:
         device = converter(result.prepared, rating, "pod_p")
-        (prepared,) = placed(result.case, device, [BUS]).prepare()
+        (prepared,) = with_devices(result.case, device, [BUS]).prepare()
         values = [mode.eigenvalue for mode in compute_modes(prepared, (0.1, 5.0)).modes]
         value = min(values, key=lambda other: abs(other - value))
     return value, values

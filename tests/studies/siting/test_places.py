@@ -8,7 +8,7 @@ from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.linear.spectra.continuation import Eigenpair, pairs_near
 from orchestrator.studies.modes.modes import running
 from orchestrator.studies.siting.confirmation import same_mode
-from orchestrator.studies.siting.placing import converter, name_at, placed, response_of
+from orchestrator.studies.siting.placing import converter, name_at, response_of, with_devices
 from orchestrator.studies.siting.study import SiteRequest, find_sites
 from orchestrator.studies.siting.view import remarks
 
@@ -22,7 +22,7 @@ def test_every_bus_of_ieee39_agrees_with_the_coupled_fmus(controller):
     found = find_sites(case, SiteRequest(controller, scenario="base", confirm=0))
     seen, buses = found.intact.modes[0], found.ranking
     device = converter(found.prepared, 1.0, controller)
-    (prepared,) = placed(case, device, buses).prepare(["base"])
+    (prepared,) = with_devices(case, device, buses).prepare(["base"])
     with running(prepared) as master:
         find_operating_point(master)
         off = Blocks(master)

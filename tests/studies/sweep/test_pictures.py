@@ -18,7 +18,7 @@ def drawn(monkeypatch):
     figures = []
     trajectory = SimpleNamespace(name="tie", case_name="tie")
     sweep = SimpleNamespace(prepared=bare_scenario(title="SG + GFOR"))
-    monkeypatch.setattr(plots, "_named", lambda samples: [(0, sweep, trajectory, None)])
+    monkeypatch.setattr(plots, "_named_curves", lambda samples: [(0, sweep, trajectory, None)])
     monkeypatch.setattr(plots, "_draw", lambda axis, *_, **__: axis.plot([1, 2], [40, 60]))
     monkeypatch.setattr(plots, "axis_label", lambda axis: "X_L [pu]")
     monkeypatch.setattr(plots, "save_figure", lambda figure, path: figures.append(figure))

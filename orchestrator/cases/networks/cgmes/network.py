@@ -157,7 +157,7 @@ class _Reading:
             ratings[label] = ratings.get(label, 0.0) + row[6]
         return CgmesNetwork(
             tables,
-            tuple(self._changes.listed()),
+            tuple(self._changes.as_problems()),
             {n: r for n, r in ratings.items() if r < _MOST_RATING},
         )
 

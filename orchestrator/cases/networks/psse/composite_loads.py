@@ -25,7 +25,7 @@ from orchestrator.cases.networks.psse.load_records import (
 )
 from orchestrator.cases.networks.psse.motor_loads import MotorLoad
 from orchestrator.cases.networks.psse.raw_network import FileLoad
-from orchestrator.core.errors import InputError, Problem, QuestionTopic, counted, few
+from orchestrator.core.errors import InputError, Problem, QuestionTopic, few, number_of
 
 COMPOSITE_NAMES = tuple(f"CMLD{subsystem}U2" for subsystem in SUBSYSTEMS)
 """The records, the narrower first."""
@@ -82,10 +82,10 @@ def composite_remarks(found: CompositeLoads) -> Iterator[Problem]:
         p_mw = sum(motor.drawn.real for motor in own)
         buses = few(dict.fromkeys(bus_of(str(motor.load.bus)) for motor in own), _SHOWN)
         text = (
-            f"{name}, a composite load, is approximated: {counted(len(own), 'induction motor')} A to C for {p_mw:.4g} "
-            f"MW ({buses}), motor D and the electronic load as constant powers, the static load by its exponents. The "
-            "transformer and the feeder before it, tripping and stalling are left out; to see what that is worth, "
-            f"leave it out: dyr_leave_out = ['{name}'] in [units]"
+            f"{name}, a composite load, is approximated: {number_of(len(own), 'induction motor')} A to C for "
+            f"{p_mw:.4g} MW ({buses}), motor D and the electronic load as constant powers, the static load by its "
+            "exponents. The transformer and the feeder before it, tripping and stalling are left out; to see "
+            f"what that is worth, leave it out: dyr_leave_out = ['{name}'] in [units]"
         )
         yield Problem(place, text, topic=QuestionTopic(f"{name} approximated"))
 

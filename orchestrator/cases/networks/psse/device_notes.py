@@ -3,7 +3,7 @@
 from orchestrator.cases.form.schema import NetworkTable
 from orchestrator.cases.networks.psse.device_flow import SolvedDevices
 from orchestrator.cases.networks.source_changes import Changes
-from orchestrator.core.errors import Problem, counted, few
+from orchestrator.core.errors import Problem, few, number_of
 
 _SHOWN = (
     3  # devices of a kind whose powers a question tells; the records (--details) have the others
@@ -32,9 +32,9 @@ def device_notes(solved: SolvedDevices, table: NetworkTable, place: str) -> list
         if not own:
             continue
         shown = few(own.values(), _SHOWN, "; ")
-        text = f"{counted(len(own), name)} without dynamics, at the solved powers: {shown}"
+        text = f"{number_of(len(own), name)} without dynamics, at the solved powers: {shown}"
         for device in own:
             changes.note(device.line, text + (_OPEN if is_open else ""))
     for device, doubt in dict.fromkeys(solved.doubts):
         changes.note(device.line, doubt)
-    return changes.listed()
+    return changes.as_problems()

@@ -114,7 +114,7 @@ def _network(
     return RawNetwork(
         tables,
         machines,
-        tuple(net.changes.listed()),
+        tuple(net.changes.as_problems()),
         frozenset(net.idle),
         records=records,
         devices=net.devices.devices,

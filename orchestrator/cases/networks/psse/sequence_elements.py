@@ -19,7 +19,7 @@ from orchestrator.cases.networks.sequence_data import (
     ZeroLine,
     ZeroTransformer,
 )
-from orchestrator.core.errors import Problem, QuestionTopic, counted, few
+from orchestrator.core.errors import Problem, QuestionTopic, few, number_of
 
 _TWO: dict[int, tuple[str, ...]] = {
     **dict.fromkeys((1, 8, 11, 18, 21), (EARTHED, EARTHED)),
@@ -307,8 +307,8 @@ class SequenceReading:
             return
         named = few(self._foreign, _SHOWN)
         text = (
-            f"{counted(len(self._foreign), 'record')} of sequence data {'are' if len(self._foreign) > 1 else 'is'} of "
-            f"buses that the network's file lacks ({named}): not used; is the file of another case?"
+            f"{number_of(len(self._foreign), 'record')} of sequence data {'are' if len(self._foreign) > 1 else 'is'} "
+            f"of buses that the network's file lacks ({named}): not used; is the file of another case?"
         )
         topic = QuestionTopic("sequence data of buses that do not exist")
         self.questions.append(Problem(self.file.place, text, topic=topic))

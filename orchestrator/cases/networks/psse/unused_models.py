@@ -15,7 +15,7 @@ from orchestrator.cases.networks.psse.missing_models import (
 from orchestrator.cases.networks.psse.motor_loads import MOTOR_NAMES
 from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
 from orchestrator.cases.networks.source_changes import Changes, Remark
-from orchestrator.core.errors import Problem, counted, few
+from orchestrator.core.errors import Problem, few, number_of
 from orchestrator.core.options import Option
 
 _MATTER = {
@@ -77,7 +77,7 @@ def unused_models(
             f"{record.name} is {RESTS}: it acts at limits only. Does the machine start within them?"
         )
         changes.note(record.line, Remark(text, RESTS))
-    return [*_strays(records, unused), *changes.listed()]
+    return [*_strays(records, unused), *changes.as_problems()]
 
 
 def _named_in(
@@ -108,7 +108,7 @@ def _strays(records: Sequence[DynamicRecord], unused: Sequence[DynamicRecord]) -
     yield Problem(
         strays[0].place,
         (
-            f"{counted(len(strays), 'record')} of {counted(len(places), 'machine')} that "
+            f"{number_of(len(strays), 'record')} of {number_of(len(places), 'machine')} that "
             f"the RAW file does not have ({few(named, _MOST_BUSES, '; ')}; first "
             f"{strays[0].name}) are passed over, as PSS/E does; "
             + Option.DETAILS

@@ -34,7 +34,7 @@ def table(
     )
 
 
-def listed(texts: Iterable[str]) -> str:
+def bullet_list(texts: Iterable[str]) -> str:
     items = "".join(f"<li>{escape(text)}</li>" for text in texts)
     return f"<ul>{items}</ul>" if items else ""
 

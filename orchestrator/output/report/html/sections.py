@@ -5,7 +5,7 @@ from html import escape
 
 import numpy as np
 
-from orchestrator.core.errors import counted
+from orchestrator.core.errors import number_of
 from orchestrator.output.report.html.charts import (
     ChartCurve,
     Mark,
@@ -175,8 +175,8 @@ def operating_point(results: Results) -> str:
                 for kind, listed in found.items()
             ]
             details.append(
-                f"<details><summary>{escape(s['title'])}: {counted(len(found['machines']), 'unit')}, "
-                f"{counted(len(buses), 'bus')}</summary>"
+                f"<details><summary>{escape(s['title'])}: {number_of(len(found['machines']), 'unit')}, "
+                f"{number_of(len(buses), 'bus')}</summary>"
                 f"{''.join(table.html() for table in shown)}</details>"
             )
         residual = f"{flow['residual']:.1e}" if flow else "–"

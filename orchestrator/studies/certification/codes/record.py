@@ -10,7 +10,7 @@ import xarray as xr
 
 from orchestrator.core.arrays import Numbers
 from orchestrator.output.report.html.charts import ChartCurve, legend, line_chart
-from orchestrator.output.report.html.elements import Figures, colour, listed, table
+from orchestrator.output.report.html.elements import Figures, bullet_list, colour, table
 from orchestrator.studies.certification.certificate import Certificate
 from orchestrator.studies.certification.codes.bench_point import BenchResult
 from orchestrator.studies.certification.codes.criteria import POWER_SHOWN
@@ -63,7 +63,7 @@ def _row(v: RowVerdict, c: Certificate) -> dict[str, Any]:
         "row": v.row.name,
         "title": v.row.title,
         "clause": v.row.clause,
-        "judged": v.judged,
+        "judged": v.is_judged,
         "accepted": v.accepted,
         "unknown": v.unknown,
         "criteria": [asdict(f) for f in v.findings],
@@ -114,11 +114,11 @@ def row_chapters(c: Certificate, figures: Figures) -> list[tuple[str, str]]:
         "Verdict",
     ]
     shown_only = [row.name for row in c.code.rows if row.shown_only]
-    without = f"<p>The code gives no verdict on</p>{listed(shown_only)}" if shown_only else ""
+    without = f"<p>The code gives no verdict on</p>{bullet_list(shown_only)}" if shown_only else ""
     return [
         ("Result", table("All criteria", columns, rows, left=9) + without),
         ("Responses and their limits", _pictures(c, figures)),
-        ("What was not tested", listed([*c.code.left_out, *c.departures])),
+        ("What was not tested", bullet_list([*c.code.left_out, *c.departures])),
     ]
 
 

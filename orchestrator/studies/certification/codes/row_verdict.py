@@ -36,7 +36,7 @@ class RowVerdict:
         return self.row.name
 
     @property
-    def judged(self) -> bool:
+    def is_judged(self) -> bool:
         return not self.not_judged and not self.row.shown_only
 
     @property
@@ -47,7 +47,7 @@ class RowVerdict:
     @property
     def accepted(self) -> bool | None:
         """Return whether every criterion is met; None where the row does not count."""
-        return all(finding.accepted for finding in self.findings) if self.judged else None
+        return all(finding.accepted for finding in self.findings) if self.is_judged else None
 
     @property
     def failed(self) -> list[RowFinding]:

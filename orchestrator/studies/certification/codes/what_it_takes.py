@@ -81,7 +81,7 @@ def plan_changes(
 
     ``patterns``: Names of the converter's parameters, also with ``*``; fixed ones that fit are taken too. Without
     patterns all tunable ones are taken."""
-    rows = [v for v in certificate.verdicts if v.judged and not v.accepted]
+    rows = [v for v in certificate.verdicts if v.is_judged and not v.accepted]
     if not rows:
         return ChangePlan(
             certificate, folder, rows=(), parameters=(), left_out={}, change=change, tasks={}

@@ -134,7 +134,7 @@ def test_an_honest_device_that_feeds_the_bench_s_resonance_is_not_failed(
     fmu = build(device("matching", "MATCHING"), tmp_path)
     found = certify_code(CertificationRequest(fmu), one_row, Serial(), tmp_path / "out")
     (verdict,) = found.verdicts
-    assert (found.verdict, verdict.judged, verdict.failed) == ("incomplete", False, [])
+    assert (found.verdict, verdict.is_judged, verdict.failed) == ("incomplete", False, [])
     (finding,) = (f for f in found.results["phase_jumps"].findings if f["kind"] == BENCH_RESONANCE)
     first, half, quarter = (
         finding[name] for name in ("frequency_hz", "frequency_at_0.5", "frequency_at_0.25")
@@ -258,7 +258,7 @@ def test_a_row_that_fails_in_an_unexpected_way_leaves_the_others_standing(
 
     monkeypatch.setattr(bench_point, "running", breaking)
     found = certified()
-    assert [(v.row.name, v.judged, v.unknown) for v in found.verdicts] == [
+    assert [(v.row.name, v.is_judged, v.unknown) for v in found.verdicts] == [
         ("inertia_up", False, "KeyError: 'licence'"),
         ("phase_jumps", True, ""),
     ]
@@ -267,4 +267,4 @@ def test_a_row_that_fails_in_an_unexpected_way_leaves_the_others_standing(
     monkeypatch.setattr(bench_point, "running", whole)
     again = certified()
     assert again.stored == 1
-    assert all(v.judged for v in again.verdicts)
+    assert all(v.is_judged for v in again.verdicts)

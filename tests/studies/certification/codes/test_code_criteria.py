@@ -299,13 +299,13 @@ def test_a_run_that_ends_early_is_not_accepted():
     whole = response(0.5)
     found = judge_row(row, BenchResult(row.name, TIMES, dict(whole.signals)), 60.0)
     assert not found.accepted
-    assert found.judged
+    assert found.is_judged
     assert [finding.criterion for finding in found.findings] == ["runs"]
 
 
 def test_a_row_that_could_not_be_run_is_not_judged():
     row = MISO.rows[0]
-    assert not judge_row(row, BenchResult(row.name, failure="no licence"), 60.0).judged
+    assert not judge_row(row, BenchResult(row.name, failure="no licence"), 60.0).is_judged
 
 
 def test_the_droop_is_measured_from_before_the_ramp_and_not_from_its_end():

@@ -40,7 +40,7 @@ def test_beside_a_slip_nothing_reads_as_accepted(kind):
     assert {f.accepted for f in judged(opposing()).findings} == {True}
     verdict = judged(opposing(), kind=kind)
     stable, *others = verdict.findings
-    assert (stable.accepted, verdict.judged, verdict.accepted) == (False, True, False)
+    assert (stable.accepted, verdict.is_judged, verdict.accepted) == (False, True, False)
     assert {(f.accepted, f.margin) for f in others} == {(None, None)}
     assert all("not judged, it" in f.text and "from t = 1.3 s on" in f.text for f in others)
     assert [f.criterion for f in verdict.failed] == ["stable"]
@@ -59,7 +59,7 @@ def resonant(p):
 def test_what_the_bench_s_own_resonance_makes_is_no_verdict_on_the_converter():
     """Also what it misses beside the slip, which stays missed where the slip is the device's own."""
     verdict = resonant(np.full(TIMES.shape, 0.5))
-    assert (verdict.judged, verdict.accepted, verdict.failed) == (False, None, [])
+    assert (verdict.is_judged, verdict.accepted, verdict.failed) == (False, None, [])
     assert verdict.not_judged == "bench_resonance is found"
     assert {(f.accepted, f.margin) for f in verdict.findings} == {(None, None)}
     assert verdict.findings[0].text.startswith(
@@ -74,7 +74,7 @@ def test_a_row_that_is_met_beside_the_bench_s_resonance_stays_met():
     findings = [{"kind": "bench_resonance", "time": 1.3, "message": "found"}]
     signals = {"p": opposing(), "q": np.full(TIMES.shape, 0.1), "v": np.ones(TIMES.shape)}
     verdict = judge_row(row, BenchResult(row.name, TIMES, signals, findings), 50.0)
-    assert (verdict.judged, verdict.accepted, verdict.not_judged) == (True, True, "")
+    assert (verdict.is_judged, verdict.accepted, verdict.not_judged) == (True, True, "")
 
 
 def test_beside_values_that_are_no_numbers_nothing_reads_as_accepted():
@@ -92,7 +92,7 @@ def test_what_is_missed_beside_a_slip_stays_missed():
 
 def test_a_row_without_a_verdict_says_so_and_keeps_its_figures():
     verdict = judged(opposing(), "jump_60")
-    assert (verdict.judged, verdict.accepted, verdict.failed) == (False, None, [])
+    assert (verdict.is_judged, verdict.accepted, verdict.failed) == (False, None, [])
     assert {verdict.word(f) for f in verdict.findings} == {"no verdict"}
     assert {f.accepted for f in verdict.findings} == {None}
     assert verdict.findings[1].value > 0.2

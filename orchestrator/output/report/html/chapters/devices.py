@@ -6,7 +6,7 @@ from html import escape
 from itertools import chain
 from pathlib import Path
 
-from orchestrator.core.errors import counted
+from orchestrator.core.errors import number_of
 from orchestrator.output.report.html.chapters.chapter import Chapter, Content
 from orchestrator.output.report.html.elements import table
 from orchestrator.output.report.strength_table import strength_table
@@ -39,7 +39,7 @@ def of_check(file: Path, c: Content) -> Chapter:
         "Can this FMU be trusted in a co-simulation?",
         answer=answer,
         good=True if c["trusted"] else untrusted,
-        sure=f"{counted(len(c['checks']), 'check')}, {remarks} with a remark",
+        sure=f"{number_of(len(c['checks']), 'check')}, {remarks} with a remark",
         not_judged=[*c["not_supported"], *_unjudged(c["checks"])],
         content=table("Checks", ["Question", "Verdict", "Evidence", "Remedy"], rows, left=4),
     )
@@ -57,7 +57,7 @@ def of_certificate(file: Path, c: Content) -> Chapter:
     open_ += dict.fromkeys([*chain(*warned), *_unjudged(check.get("checks", []))])
     trusted = check.get("trusted") is not False
     good = {"passes": trusted, "fails": False}.get(c["verdict"])
-    tests = counted(len(c["rows"]), "test") if "rows" in c else ""
+    tests = number_of(len(c["rows"]), "test") if "rows" in c else ""
     sure = f"judged: {c['judged']}" if c.get("judged") else tests
     question = f"Does the converter pass the tests of {c['code'].upper() if 'code' in c else 'the grid code'}?"
     return Chapter(file, question, c["sentence"], good, sure, open_, page="certificate.html")
@@ -73,7 +73,7 @@ def of_matrix(file: Path, c: Content) -> Chapter:
         "Which converter passes which grid code?",
         c["sentence"],
         c["exit_code"] == 0,
-        f"{counted(len(c['cells']), 'pair')} of a device and a code",
+        f"{number_of(len(c['cells']), 'pair')} of a device and a code",
         lost,
         page="matrix.html",
     )

@@ -4,7 +4,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from orchestrator.core.errors import counted
+from orchestrator.core.errors import number_of
 from orchestrator.output.report.html.chapters.chapter import Chapter, modes_map
 from orchestrator.output.report.html.elements import damping, table
 
@@ -28,7 +28,7 @@ def of_comparison(file: Path, signals: Any) -> Chapter:
         "How do two runs differ?",
         answer=answer,
         good=None,
-        sure=counted(len(signals), "signal"),
+        sure=number_of(len(signals), "signal"),
         not_judged=(),
         content=table("Differences", columns, rows, left=2),
     )
@@ -50,7 +50,9 @@ def of_identified(file: Path, modes: Any) -> Chapter:
         if swing
         else "no oscillation"
     )
-    sure = f"{sum(not m['doubts'] for m in modes)} of {counted(len(modes), 'mode')} without a doubt"
+    sure = (
+        f"{sum(not m['doubts'] for m in modes)} of {number_of(len(modes), 'mode')} without a doubt"
+    )
     doubts = [f"{m['frequency_hz']:.3f} Hz: {text}" for m in modes for text in m["doubts"]]
     return Chapter(
         file,

@@ -7,7 +7,7 @@ from typing import Any
 
 import xarray as xr
 
-from orchestrator.core.errors import counted
+from orchestrator.core.errors import number_of
 from orchestrator.core.truth import all_true
 from orchestrator.output.report.html import studies
 from orchestrator.output.report.html.chapters.chapter import (
@@ -29,7 +29,7 @@ _DESIGNED = {"without": "target", "predicted": "predicted", "with": "achieved"}
 
 def of_screening(file: Path, c: Content) -> Chapter:
     where = "somewhere" if c["stable"] is False else "everywhere"
-    points, outages = counted(c["points"], "operating point"), counted(c["outages"], "outage")
+    points, outages = number_of(c["points"], "operating point"), number_of(c["outages"], "outage")
     answer = f"{VERDICTS[c['stable']]} {where}: {points}, {outages}"
     least = min(c["modes"], key=lambda mode: mode["worst"]["damping_percent"], default=None)
     told = []
@@ -52,7 +52,7 @@ def of_screening(file: Path, c: Content) -> Chapter:
         "Which operating point and which outage is worst?",
         answer,
         c["stable"],
-        f"{counted(c['items'], 'case')} computed, {growth}",
+        f"{number_of(c['items'], 'case')} computed, {growth}",
         lost,
         page="screening.html",
         least=told,
@@ -144,7 +144,7 @@ def of_sweep(place: Path, sweep: xr.Dataset) -> Chapter:
     stable = sweep.get("stable")
     lost = 0 if stable is None else int((stable == 0).sum())
     unknown = 0 if stable is None else int((~stable.isin([0, 1])).sum())
-    open_ = [f"stability at {counted(unknown, 'point')}"] if unknown else []
+    open_ = [f"stability at {number_of(unknown, 'point')}"] if unknown else []
     open_ += json.loads(sweep.attrs.get("warned", "[]"))
     about = {
         "models": sweep.attrs.get("models"),
@@ -165,7 +165,7 @@ def of_sweep(place: Path, sweep: xr.Dataset) -> Chapter:
             bases=bases,
         )
     answer = f"least damping {float(least.min()):.2f} % at {where}" + (
-        f"; UNSTABLE at {counted(lost, 'point')}" if lost else ""
+        f"; UNSTABLE at {number_of(lost, 'point')}" if lost else ""
     )
     return Chapter(
         place,
@@ -183,7 +183,7 @@ def of_interactions(file: Path, c: Content) -> Chapter:
     whole = c["as_in_the_case"]["stable"]
     verdicts = [whole, *(one["stable"] for one in (*c["pairs"], *c.get("assignments", [])))]
     good = all_true(verdicts)
-    answer = f"{VERDICTS[whole]} as in the case; {counted(len(c['interaction_modes']), 'mode')} that vendors share"
+    answer = f"{VERDICTS[whole]} as in the case; {number_of(len(c['interaction_modes']), 'mode')} that vendors share"
     answer += f"; {worst['sentence']}" if worst else ""
     sure = f"each of {len(c['vendors'])} vendors alone and each pair, the others as {c['stand_in']}"
     lost = [f"pair {' and '.join(pair)}" for pair in c["unknown_pairs"]]
@@ -240,7 +240,7 @@ def of_sensitivities(file: Path, c: Content) -> Chapter:
         f"What moves the {mode['name'] or 'critical'} mode of {c['scenario']}?",
         answer=answer,
         good=None,
-        sure=f"{c['derivative']} derivatives by {counted(len(found), 'parameter')}",
+        sure=f"{c['derivative']} derivatives by {number_of(len(found), 'parameter')}",
         not_judged=[f"{r['parameter']}: {r['reason']}" for r in c["sensitivities"] if r["reason"]],
         content=bars + table("By the size of their effect", columns, rows),
     )
