@@ -115,6 +115,7 @@ def imports():
     return graph
 
 
+@cache  # it is asked for each import
 def inside():
     """Modules on the floors of the orchestrator."""
     return {name for name in modules() if within(name, *(f"orchestrator.{f}" for f in FLOORS))}
