@@ -128,6 +128,27 @@ REFERENCES = (
         ("i_re", "i_im", "e_re", "e_im", "B"),
     ),
     Reference(
+        "csvgn5_phasor",
+        "fmus/static_var/reference_csvgn5.csv",
+        {"Q_0": 0.15},
+        *_BUS,
+        ("i_re", "i_im", "e_re", "e_im", "B"),
+    ),
+    Reference(
+        "svsmo1_phasor",
+        "fmus/static_var/reference_svsmo1.csv",
+        {"Q_0": 0.15},
+        *_BUS,
+        ("i_re", "i_im", "e_re", "e_im", "B"),
+    ),
+    Reference(
+        "cstatt_phasor",
+        "fmus/static_var/reference_cstatt.csv",
+        {"Q_0": 0.15},
+        *_BUS,
+        ("i_re", "i_im", "e_re", "e_im", "I"),
+    ),
+    Reference(
         "dera1_phasor",
         "fmus/distributed_generation/reference.csv",
         {"P_0": 0.8, "Q_0": 0.05, "Kqv": 5.0, "dbd1": -0.001, "dbd2": 0.001},

@@ -66,6 +66,10 @@ ALL_PATHS_OPEN = {
     "gfl_l2ep_phasor": _L2EP_OPEN | {"communication_step": 5e-3},
     "static_generation_phasor": {"communication_step": 5e-3, "R": 0.01},
     "csvgn1_phasor": {"communication_step": 5e-3, "R": 0.01},
+    "csvgn3_phasor": {"communication_step": 5e-3, "R": 0.01},
+    "csvgn5_phasor": {"communication_step": 5e-3, "DV": 0.5, "R": 0.01},
+    "cstatt_phasor": {"communication_step": 5e-3, "R": 0.01},
+    "svsmo1_phasor": {"communication_step": 5e-3, "R": 0.01, "Tb2": 0.5, "Kps": 0.01},
     "induction_motor_phasor": {"communication_step": 5e-3, "R2": 0.05, "X2": 0.1, "A": 0.5},
     "induction_generator_phasor": {
         "communication_step": 5e-3,
@@ -126,6 +130,17 @@ BEHIND_LEFT_OUT_BLOCKS = {"P_m", "B", "I_p_command", "I_q_command"}
 BEHIND_THRESHOLDS = {name: {"pll.freezing.awake"} for name in ("gfl_l2ep", "gfl_l2ep_phasor")} | {
     "regfm_b1_phasor": {"delta_ITmax", "delta_ITmin", "Idf", "Qf"},  # at limits, and by VdrpFlag
     "csvgn1_phasor": {"first", "second"},  # T5 = 0 leaves out the lag between them and the outputs
+    "csvgn3_phasor": {"first", "second"},
+    "csvgn5_phasor": {"measured", "first", "second"},  # the same of Ts6
+    # the same of T2; and a deadband, a rating and a slow control that rest
+    "svsmo1_phasor": {
+        "measured",
+        "gain",
+        "above",
+        "regulator",
+        "deadband.latch",
+        "slow.integrator",
+    },
     "induction_motor_phasor": {"relay.latch", "relay.opening"},
     "pvd1_phasor": {"trip_high_frequency.lost"},  # a share below 1 % is forgotten
 }

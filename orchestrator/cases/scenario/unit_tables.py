@@ -307,7 +307,9 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> tuple[list[UnitRow], Sequen
         draft,
         [
             *(
-                UnusualValue(f"sg{row.label}.{doubt.variable}", doubt.place, doubt.text, doubt.kind)
+                UnusualValue(
+                    f"{_component(row)}.{doubt.variable}", doubt.place, doubt.text, doubt.kind
+                )
                 for row in machine_rows
                 for doubt in row.doubts
             ),
@@ -332,6 +334,11 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> tuple[list[UnitRow], Sequen
             "in [components.grid] (`gfor new --models phasor`)",
         )
     return rows, motors
+
+
+def _component(row: UnitRow) -> str:
+    """Return the name of a unit's component before it has one: a machine's, or a converter's."""
+    return f"{'gfor' if row.converter else 'sg'}{row.label}"
 
 
 def _choosing_exciters(draft: Draft, rows: Sequence[UnitRow]) -> set[str]:

@@ -86,7 +86,7 @@ def shunt_record(record: Record, revision: int, place: int) -> ShuntRecord | Non
     most, least = record.number(high, "VSWHI", 1.0), record.number(high + 1, "VSWLO", 1.0)
     bus = record.whole(high + 2, "SWREM", 0) or place
     initial = high + (6 if has_identifier else 5)
-    blocks = _blocks(record, initial + 1, with_status=has_identifier)
+    blocks = shunt_blocks(record, initial + 1, with_status=has_identifier)
     positions = {0.0, *accumulate(x for x in blocks if x > 0)}
     positions |= {*accumulate(x for x in blocks if x < 0)}
     if not (0 < least < most and 1 < len(positions) <= _MOST_POSITIONS):
@@ -95,7 +95,7 @@ def shunt_record(record: Record, revision: int, place: int) -> ShuntRecord | Non
     return ShuntRecord(place, abs(bus), least, most, own, tuple(sorted(positions)))
 
 
-def _blocks(record: Record, column: int, *, with_status: bool) -> Sequence[float]:
+def shunt_blocks(record: Record, column: int, *, with_status: bool) -> Sequence[float]:
     """Return the steps of a switched shunt one by one, in the order in which they are switched on [Mvar]."""
     found: list[float] = []
     width = 2 + with_status

@@ -24,6 +24,12 @@ _OWN_MODELS = (
 NUMBERED = ("VTGTPAT", "VTGDCAT", "FRQTPAT", "FRQDCAT")
 """Relays whose records begin with a number of their own, where others have a bus."""
 
+OF_SHUNTS = {"SVSMO1T2": False, "SVSMO1T3": True}
+"""Models of switched shunts, and whether the shunt's identifier follows the name: it does from revision 35 on."""
+
+ONLY_SHUNT = "1"
+"""Identifier of a switched shunt where there is only one at a bus."""
+
 _BEFORE_ICONS = (
     6  # numbers of a user's model: its two codes, and how many of four kinds of values there are
 )
@@ -80,6 +86,11 @@ def read_dyr(path: Path) -> list[DynamicRecord]:
     return records
 
 
+def shunt_name(identifier: str) -> str:
+    """Return what a switched shunt's unit is called beside machines at its bus, which have short names of their own."""
+    return f"shunt {identifier}"
+
+
 def _record(file: str, line: int, tokens: Sequence[str], names: int) -> DynamicRecord:
     if len(tokens) > 2 and tokens[1].upper() == EVENT:
         return DynamicRecord(file, line, 0, EVENT, tokens[2], tuple(tokens[3:]))
@@ -96,6 +107,10 @@ def _record(file: str, line: int, tokens: Sequence[str], names: int) -> DynamicR
         name, values = values[0].upper(), values[1:]
         if f"{name}T" in NUMBERED:
             return DynamicRecord(file, line, 0, f"{name}T", "", _of_users_relay(values))
+    if name in OF_SHUNTS:
+        values = values if OF_SHUNTS[name] else (machine, *values)
+        identifier = machine if OF_SHUNTS[name] else ONLY_SHUNT
+        return DynamicRecord(file, line, int(tokens[0]), name, shunt_name(identifier), values)
     if name in NUMBERED:
         return DynamicRecord(file, line, 0, name, "", (machine, *values))
     return DynamicRecord(file, line, int(tokens[0]), name, machine, values)

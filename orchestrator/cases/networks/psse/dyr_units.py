@@ -229,6 +229,7 @@ def with_records(
                     converter=model.converter,
                     replaced=model.replaced,
                     measured=model.measured,
+                    doubts=model.doubts,
                     lines=model.lines,
                 )
             )

@@ -22,6 +22,7 @@ from orchestrator.cases.networks.psse.motor_loads import MOTOR_NAMES
 from orchestrator.cases.networks.psse.relay_records import LOAD_RELAYS, OF_BUSES
 
 _LIBRARY = "PSS/E's model library as PowerWorld's and NEPLAN's guides and ANDES' reader describe it"
+_COMPENSATORS = "PowerWorld's guide to PSS/E's models; CSVGN5 and SVSMO1 as InterPSS reads them"
 _REGFM = "WECC's specification of REGFM_A1"
 _REGFM_B1 = "WECC's specification of REGFM_B1, in PNNL's script for PSS/E"
 _LOADS = "GridPACK's reader and model"
@@ -71,7 +72,7 @@ def known_records() -> list[KnownRecord]:
         for name, record in REGFM_B1_RECORDS.items()
     ]
     found += [
-        KnownRecord(name, "device", record.part, _LIBRARY, "; ".join(_limits(record)))
+        KnownRecord(name, "device", record.part, _COMPENSATORS, "; ".join(_limits(record)))
         for name, record in STATIC_VAR_RECORDS.items()
     ]
     found += [

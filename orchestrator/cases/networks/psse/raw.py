@@ -25,7 +25,7 @@ from orchestrator.cases.networks.psse.raw_tables import (
     RawTables,
 )
 from orchestrator.cases.networks.psse.records import leave_out
-from orchestrator.cases.networks.psse.static_vars import Modelled, units_of_devices
+from orchestrator.cases.networks.psse.static_vars import Modelled, units_of_devices, units_of_shunts
 from orchestrator.cases.networks.source_changes import Changes
 from orchestrator.cases.networks.sources import SourceTables
 
@@ -42,7 +42,7 @@ def read_raw(
 
     ``slack``: the unit or bus that a case names as the reference: nothing then stands at the file's own one where no
     machine is in service. ``modelled``: bus and identifier of records of static var compensators, which may be of FACTS
-    devices."""
+    devices and switched shunts."""
     raw = read_file(path)
     net = RawTables(raw, Changes(raw.place), keep_load_parts)
     return _network(net, leaving_out, slack, modelled)
@@ -74,12 +74,13 @@ def _network(
     read_buses(net)
     merge_buses(net)
     read_loads(net)
-    read_shunts(net)
+    read_shunts(net, modelled)
     read_lines(net)
     read_transformers(net)
     _read_devices(net, leaving_out)
     machines = read_machines(net)
     machines = (*machines, *units_of_devices(net, machines, modelled))
+    machines = (*machines, *units_of_shunts(net, modelled))
     machines = (*machines, *infinite_buses(net, machines, slack))
     leave_out_bare_buses(net, machines)
     gen = np.zeros((len(machines), GENERATOR_COLUMNS))
@@ -110,7 +111,10 @@ def _network(
         branch_keys=tuple(net.keys),
         regions=regions_of(net.raw),
     )
-    records = record_uses(net.file, net.merged, leaving_out, net.devices.unused, net.dropped)
+    of_devices = net.devices.unused
+    records = record_uses(
+        net.file, net.merged, leaving_out, of_devices, net.dropped, modelled=net.modelled
+    )
     return RawNetwork(
         tables,
         machines,

@@ -35,12 +35,14 @@ def record_uses(
     leaving_out: Collection[str],
     unused: Mapping[tuple[str, int], str],
     dropped: Mapping[int, str],
+    *,
+    modelled: Collection[int] = (),
 ) -> tuple[RecordUse, ...]:
     """Return what became of every element of a file, by the first line of its record.
 
     ``merged``: lines of zero impedance lines that make their buses one; ``leaving_out``: elements that the user leaves
     out; ``unused``: why a device is not used, by section and place among its elements; ``dropped``: why another element
-    is not used, by the line of its record."""
+    is not used, by the line of its record; ``modelled``: lines of devices that are units with a model."""
     found = []
     for section, records in raw.sections.items():
         for k, lines in enumerate(elements(section, records)):
@@ -49,6 +51,8 @@ def record_uses(
                 use, why = UseOfRecord.NOT_USED, "zero impedance: its buses are one"
             if (section, k) in unused:
                 use, why = UseOfRecord.NOT_USED, unused[section, k]
+            if lines[0].line in modelled:
+                use, why = UseOfRecord.USED, "by the model of its record of dynamics data"
             if lines[0].line in dropped:
                 use, why = UseOfRecord.NOT_USED, dropped[lines[0].line]
             found.append(RecordUse(raw.place, lines[0].line, section, use, why))

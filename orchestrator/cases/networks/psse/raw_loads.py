@@ -1,12 +1,14 @@
 """Loads and shunts of a PSS/E RAW file."""
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
 
 from orchestrator.cases.networks.bus_loads import BusLoads
-from orchestrator.cases.networks.psse.controls import shunt_record
+from orchestrator.cases.networks.psse.controls import shunt_blocks, shunt_record
+from orchestrator.cases.networks.psse.dyr_records import ONLY_SHUNT, shunt_name
 from orchestrator.cases.networks.psse.raw_network import FileLoad
 from orchestrator.cases.networks.psse.raw_tables import RawTables, is_in_service
+from orchestrator.cases.networks.psse.records import NODES, Record
 from orchestrator.cases.networks.source_changes import Remark
 from orchestrator.cases.networks.sources import SourceTables
 
@@ -63,7 +65,44 @@ def named_loads(net: RawTables, tables: SourceTables) -> Iterator[FileLoad]:
         yield replace(load, load=f"static_{tables.labels[bus]}") if apart else load
 
 
-def read_shunts(net: RawTables) -> None:
+@dataclass(frozen=True, slots=True)
+class SwitchedShunt:
+    """A switched shunt in service: its bus, the identifier of its model's records, BINIT, and its ends [Mvar at 1 pu].
+
+    ``mode``: MODSW; 0 where it is held."""
+
+    record: Record
+    bus: int
+    name: str
+    mode: int
+    initial: float
+    least: float
+    most: float
+
+
+def switched_shunts(net: RawTables) -> Iterator[SwitchedShunt]:
+    status, mode, initial = _SWITCHED[sum(net.raw.revision >= first for first in (32, 35))]
+    has_identifier = net.raw.revision >= NODES
+    for record in net.raw.of("switched shunt"):
+        if not is_in_service(record, status, "STAT"):
+            continue
+        identifier = record.text(1, ONLY_SHUNT).strip() if has_identifier else ONLY_SHUNT
+        blocks = shunt_blocks(record, initial + 1, with_status=has_identifier)
+        yield SwitchedShunt(
+            record,
+            net.bus(record),
+            shunt_name(identifier),
+            mode=record.whole(mode, "MODSW", 1),
+            initial=record.number(initial, "BINIT", 0.0),
+            least=sum(x for x in blocks if x < 0),
+            most=sum(x for x in blocks if x > 0),
+        )
+
+
+def read_shunts(net: RawTables, modelled: Collection[tuple[int, str]] = ()) -> None:
+    """Add all shunts to their buses, but switched ones that are units with a model.
+
+    ``modelled``: bus and identifier of such models' records."""
     for record in net.raw.of("fixed shunt"):
         if is_in_service(record, 2, "STATUS"):
             bus = net.bus(record)
@@ -72,15 +111,14 @@ def read_shunts(net: RawTables) -> None:
                 text = f"shunt that draws GL = {drawn.real:g} MW: is it BL, in Mvar?"
                 net.changes.note(record.line, Remark(text, "a shunt that draws active power"))
             net.add(bus, 4, drawn)
-    status, mode, initial = _SWITCHED[sum(net.raw.revision >= first for first in (32, 35))]
-    for record in net.raw.of("switched shunt"):
-        if not is_in_service(record, status, "STAT"):
+    for shunt in switched_shunts(net):
+        place = net.own_bus(shunt.record)
+        if (place, shunt.name) in modelled:
             continue
-        bus = net.bus(record)
-        if record.whole(mode, "MODSW", 1):
-            net.changes.note(record.line, "switched shunt: held at BINIT")
-        net.add(bus, 4, complex(0.0, record.number(initial, "BINIT", 0.0)))
-        control = shunt_record(record, net.raw.revision, net.own_bus(record))
+        if shunt.mode:
+            net.changes.note(shunt.record.line, "switched shunt: held at BINIT")
+        net.add(shunt.bus, 4, complex(0.0, shunt.initial))
+        control = shunt_record(shunt.record, net.raw.revision, place)
         seen = net.standing(control.bus) if control else None
         if control and seen is not None:
-            net.stepping.append(control.at(bus, seen))
+            net.stepping.append(control.at(shunt.bus, seen))

@@ -56,6 +56,8 @@ class RawTables:
         self.circuits: dict[tuple[frozenset[int], str], tuple[int, int]] = {}
         self.at_buses: dict[int, BusLoads] = {}
         self.devices = FoundDevices((), {})
+        # lines of devices and switched shunts that are units, with a model of dynamics data
+        self.modelled: set[int] = set()
         # with the bus at which it stands, and whether it feeds
         self.file_loads: list[tuple[FileLoad, int, bool]] = []
         self.same: dict[int, int] = {}  # bus that PSS/E takes as one with another → the other

@@ -10,6 +10,9 @@ from orchestrator.cases.networks.psse.raw_network import Machine
 from orchestrator.cases.networks.psse.record_values import CEILING, FLOOR, chosen_ceiling
 from orchestrator.cases.networks.unit_row import DoubtOfRecord
 
+_HELD_BUS = "IB"
+"""Field with the bus whose voltage a compensator holds; 0 and its own number are its terminal."""
+
 _SAME = 1e-3  # part by which two figures for one reactance may differ: files round them
 
 
@@ -37,7 +40,8 @@ def _omissions(records: Sequence[DynamicRecord]) -> Iterator[DoubtOfRecord]:
             continue
         given = given_values(record, known.fields, {*KNOWN_RECORDS, *FIELDS})
         for name, text in known.omissions.items():
-            if given[name]:
+            is_own = name == _HELD_BUS and given[name] == record.bus
+            if given[name] and not is_own:
                 said = f"{record.name} has {name} = {given[name]:g}: {text}"
                 kind = f"{record.name} without {name}"
                 yield DoubtOfRecord(known.kind, record.place, said, kind)

@@ -1,16 +1,19 @@
-"""FACTS devices whose bus has a record of a static var compensator: they are units with that model.
+"""FACTS devices and switched shunts with a record of a static var compensator: they are units with that model.
 
-PSS/E's CSVGN1 is of a generator; where the RAW file has a FACTS device in its place, the unit feeds what that does."""
+PSS/E's CSVGN1 and its like are of generators; where the RAW file has a FACTS device in its place, the unit feeds what
+that does. SVSMO1T2 is of a switched shunt."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import replace
 
+from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
 from orchestrator.cases.networks.psse.facts_devices import FactsDevice
+from orchestrator.cases.networks.psse.raw_loads import switched_shunts
 from orchestrator.cases.networks.psse.raw_network import Machine
 from orchestrator.cases.networks.psse.raw_tables import RawTables
 from orchestrator.cases.networks.source_changes import Remark
 
-RECORDS = ("CSVGN1",)
+RECORDS = (*STATIC_VAR_RECORDS,)
 """Names of records that are of a static var compensator at a bus."""
 
 _SOURCE = 1j  # ZSORCE where a record does not say it [pu of the rating]
@@ -35,7 +38,8 @@ def units_of_devices(
         Bus and identifier of the records.
     """
     there = {(machine.bus, machine.name.strip()) for machine in machines} | net.idle
-    of_bus = {bus: name for bus, name in modelled if (bus, name) not in there}
+    shunts = {(shunt.record.whole(0, "I"), shunt.name) for shunt in switched_shunts(net)}
+    of_bus = {bus: name for bus, name in modelled if (bus, name) not in there | shunts}
     kept = []
     for device in net.devices.devices:
         is_shunt = isinstance(device, FactsDevice) and not device.terminal and not device.is_remote
@@ -48,6 +52,7 @@ def units_of_devices(
             f"FACTS device with a record of its model at bus {bus}: a unit of 0 MW that holds VSET, with that model on "
             f"{most:g} MVA (SHMX, in the place of a generator's MBASE)"
         )
+        net.modelled.add(device.line)
         net.changes.note(device.line, Remark(text, "a FACTS device with a record of its model"))
         yield Machine(
             bus,
@@ -61,3 +66,35 @@ def units_of_devices(
             q_max_mvar=most,
         )
     net.devices = replace(net.devices, devices=tuple(kept))
+
+
+def units_of_shunts(net: RawTables, modelled: Modelled) -> Iterator[Machine]:
+    """Yield a unit for each switched shunt with a model; `read_shunts` leaves it out.
+
+    It holds the voltage of the file's solution, so that it feeds BINIT where that is solved."""
+    for shunt in switched_shunts(net):
+        place = net.own_bus(shunt.record)
+        if (place, shunt.name) not in modelled:
+            continue
+        v = net.magnitudes[shunt.bus]
+        least, most = min(shunt.least, shunt.initial), max(shunt.most, shunt.initial)
+        text = (
+            f"switched shunt with a record of its model at bus {place}: a unit of 0 MW that holds {v:g} pu, the file's "
+            f"voltage, between {least * v**2:.4g} and {most * v**2:.4g} Mvar (BINIT = {shunt.initial:g}), with that "
+            f"model on {net.raw.base_mva:g} MVA"
+        )
+        kind = "a switched shunt with a record of its model"
+        net.modelled.add(shunt.record.line)
+        net.changes.note(shunt.record.line, Remark(text, kind))
+        yield Machine(
+            shunt.bus,
+            shunt.name,
+            shunt.record.line,
+            p_mw=0.0,
+            v_pu=v,
+            rating_mva=net.raw.base_mva,
+            source=_SOURCE,
+            q_min_mvar=least * v**2,
+            q_max_mvar=most * v**2,
+            q_mvar=shunt.initial * v**2,
+        )

@@ -268,7 +268,7 @@ def test_a_limiter_of_excitation_rests_and_is_asked_about(tmp_path):
 def test_a_static_var_compensator_that_is_missing_is_no_record_that_may_go(tmp_path):
     """Without it nothing stands for its generator of the RAW file; beside a machine it may go."""
     without = CLASSICAL.replace("3 'GENCLS' 1 4.0 0.0 /\n", "")
-    record = "3 'CSVGN3' 1 10 0 0 0 0 1 0 1 0 0.1 /\n"
-    text = refusal(tmp_path, without + record, ["CSVGN3"])
-    assert "CSVGN3, the machine itself (1 of 300 MW); it cannot be left out" in text
-    assert "write dyr_leave_out = ['CSVGN3']" in refusal(tmp_path, CLASSICAL + record)
+    record = "3 'CSVGN6' 1 10 0 0 0 0 1 0 1 0 0.1 /\n"
+    text = refusal(tmp_path, without + record, ["CSVGN6"])
+    assert "CSVGN6, the machine itself (1 of 300 MW); it cannot be left out" in text
+    assert "write dyr_leave_out = ['CSVGN6']" in refusal(tmp_path, CLASSICAL + record)

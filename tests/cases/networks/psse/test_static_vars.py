@@ -1,4 +1,4 @@
-"""CSVGN1 at the bus of a FACTS device: the model stands where the device is."""
+"""Records of compensators: at FACTS devices, at generators and at switched shunts, where the device is."""
 
 import json
 
@@ -52,3 +52,145 @@ def test_a_case_has_the_model_there(gfor, folder):
     assert abs(unit["q_mvar"]) < 60
     voltage = next(x for x in scenario["power_flow"]["buses"] if x["name"] == "bus_8")["v_pu"]
     assert voltage == pytest.approx(1.03)
+
+
+COMPENSATORS = {
+    "CSVGN3": "50.0 0.0 0.0 0.1 0.0 0.05 0.0 1.0 0.0 60.0 0.2",
+    "CSVGN4": "{bus} 50.0 0.0 0.0 0.1 0.0 0.05 0.0 1.0 0.0 60.0 0.2",
+    "CSVGN5": "{bus} 0.02 0.1 0.0 0.1 0.0 0.0 50.0 2.0 1.2 1.0 -1.0 -1.2 0.05 0.15",
+    "CSTATT": "0.0 0.0 0.1 0.0 25.0 0.03 99 -99 1.2 1.2 0.2 1.3 0.1 0.5",
+}
+PARTS = {
+    "CSVGN3": "csvgn3_phasor",
+    "CSVGN4": "csvgn3_phasor",
+    "CSVGN5": "csvgn5_phasor",
+    "CSTATT": "cstatt_phasor",
+}
+
+
+def with_compensator(folder, name, bus=8):
+    """A generator of 0 MW at bus 8, with a compensator's record."""
+    found = records(33)
+    found["BUS"] = [
+        line.replace(",230.0,1,", ",230.0,2,") if line.startswith("8,") else line
+        for line in found["BUS"]
+    ]
+    found["GENERATOR"] += ["8,'1 ',0,0,60,-60,1.02,0,60,0,1.0,0,0,1,1,100,0,0,1,1"]
+    (folder / "grid.raw").write_text(raw(33, found))
+    record = f"8 '{name}' 1 {COMPENSATORS[name].format(bus=bus)} /\n"
+    (folder / "grid.dyr").write_text(MACHINES + record)
+    return folder / "grid.raw", folder / "grid.dyr"
+
+
+def power_flow(gfor, case):
+    code, out, err = gfor("modes", case, "--scenario", "base", "--json")
+    assert code == 0, err
+    return json.loads(out)["scenarios"][0]["power_flow"]
+
+
+def voltage(flow):
+    return next(x for x in flow["buses"] if x["name"] == "bus_8")["v_pu"]
+
+
+def questions_of(listed):
+    return " ".join(json.dumps(listed["questions"]).split())
+
+
+@pytest.mark.parametrize("name", COMPENSATORS)
+def test_a_generator_with_a_compensators_record_is_that_compensator(gfor, tmp_path, name):
+    code, out, err = gfor(
+        "new", *with_compensator(tmp_path, name), "--out", tmp_path / "case.toml", "--json"
+    )
+    assert code == 0, err
+    listed = json.loads(out)
+    assert {one["kind"]: one["use"] for one in listed["records"]}[name] == "used"
+    assert "own bus" not in questions_of(listed)
+    flow = power_flow(gfor, tmp_path / "case.toml")
+    (unit,) = [x for x in flow["machines"] if x["bus"] == "bus_8"]
+    assert unit["p_mw"] == pytest.approx(0, abs=1e-6)
+    assert voltage(flow) == pytest.approx(1.02)
+
+
+@pytest.mark.parametrize("name", ["CSVGN4", "CSVGN5"])
+def test_a_compensator_that_holds_another_bus_is_asked_about(gfor, tmp_path, name):
+    code, out, err = gfor(
+        "new", *with_compensator(tmp_path, name, bus=7), "--out", tmp_path / "case.toml", "--json"
+    )
+    assert code == 0, err
+    assert f"{name} has IB = 7: it holds the voltage of its own bus instead" in questions_of(
+        json.loads(out)
+    )
+
+
+SVSMO1 = """
+ 0.18 {uv1} 0.31 0.48 1.80 2.00 0.93 6.7 0.91 0.27 0.023 0.0 0.0 1.08 0.92 0.0 0.012 0.0 0.0 42.0 210.0 0.45 -0.45
+ 0.012 1.10 0.95 -0.30 0.35 0.0 0.0 0.0 0.0 0.0 0.0 0.0 0.13 0.4 37.0 19.0 -38.0 -18.0 0.09 0.47 2.8 280.0 0.80 1.20 /
+"""
+"""Constants of SVSMO1T2 as InterPSS' public example has them (`PSSE_5Bus_svsmo1t2_synthetic.dyr`)."""
+SLOTS = " ".join(f"0 '{k}'" for k in range(1, 9))
+SHUNTS = {
+    33: "8,2,0,1,1.02,1.02,0,100,'',30.0,1,40.0,1,-30.0",
+    35: "8,'A ',2,0,1,1.02,1.02,0,0,100,'',30.0,1,1,40.0,1,1,-30.0",
+}
+
+
+def with_shunt(folder, revision=33, at=8, uv1="0.0"):
+    found = records(revision)
+    found["SWITCHED SHUNT"] += [SHUNTS[revision]]
+    (folder / "grid.raw").write_text(raw(revision, found))
+    begin = f"{at} 'SVSMO1T2'" if revision == 33 else f"{at} 'SVSMO1T3' 'A'"
+    constants = SVSMO1.format(uv1=uv1)
+    (folder / "grid.dyr").write_text(f"{MACHINES}{begin} 8 0 0 {SLOTS}{constants}")
+    return folder / "grid.raw", folder / "grid.dyr"
+
+
+@pytest.mark.parametrize(("revision", "name"), [(33, "shunt 1"), (35, "shunt A")])
+def test_a_switched_shunt_with_a_model_is_a_unit_and_no_shunt(tmp_path, revision, name):
+    with_shunt(tmp_path, revision)
+    table = NetworkTable(raw="grid.raw")
+    held = network_data(table, tmp_path)
+    data = network_data(table, tmp_path, None, frozenset({(8, name)}))
+    (unit,) = [machine for machine in data.machines if machine.bus == 8]
+    assert (unit.p_mw, unit.v_pu, unit.rating_mva) == (0.0, 1.0, 100.0)
+    assert (unit.q_min_mvar, unit.q_max_mvar) == (-30.0, 40.0)
+    assert {machine.bus for machine in held.machines} == {1, 2, 3}
+    assert [x.use.value for x in held.records if x.kind == "switched shunt"] == ["held"]
+    assert [x.use.value for x in data.records if x.kind == "switched shunt"] == ["used"]
+
+
+@pytest.mark.parametrize("revision", [33, 35])
+def test_a_solved_file_gives_the_system_what_its_shunt_feeds(gfor, tmp_path, revision):
+    """The voltage of the power flow with the shunt held at BINIT, as the file's: the system then feeds BINIT·V²."""
+    files = with_shunt(tmp_path, revision)
+    records_of_system = files[1].read_text()
+    files[1].write_text(MACHINES)
+    assert gfor("new", *files, "--out", tmp_path / "held.toml")[0] == 0
+    v = voltage(power_flow(gfor, tmp_path / "held.toml"))
+    files[0].write_text(files[0].read_text().replace("1,1.0,0.0,1.1,0.9", f"1,{v!r},0.0,1.1,0.9"))
+    files[1].write_text(records_of_system)
+    code, out, err = gfor("new", *files, "--out", tmp_path / "case.toml", "--json")
+    assert code == 0, err
+    used = {one["kind"]: one["use"] for one in json.loads(out)["records"]}
+    assert used["SVSMO1T2" if revision == 33 else "SVSMO1T3"] == "used"
+    assert "UV1" not in questions_of(json.loads(out))
+    (unit,) = [
+        x for x in power_flow(gfor, tmp_path / "case.toml")["machines"] if x["bus"] == "bus_8"
+    ]
+    assert unit["p_mw"] == pytest.approx(0, abs=1e-6)
+    assert unit["q_mvar"] == pytest.approx(30.0 * v**2, abs=0.01)
+
+
+def test_its_strategy_at_low_voltage_is_asked_about(gfor, tmp_path):
+    code, out, err = gfor(
+        "new", *with_shunt(tmp_path, uv1="0.6"), "--out", tmp_path / "case.toml", "--json"
+    )
+    assert code == 0, err
+    assert "SVSMO1T2 has UV1 = 0.6" in questions_of(json.loads(out))
+
+
+def test_a_model_of_a_shunt_that_is_not_there_is_asked_about(gfor, tmp_path):
+    code, out, err = gfor(
+        "new", *with_shunt(tmp_path, at=7), "--out", tmp_path / "case.toml", "--json"
+    )
+    assert code == 0, err
+    assert "SVSMO1T2 (bus 7) is of no machine and not used" in questions_of(json.loads(out))
