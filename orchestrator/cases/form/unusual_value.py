@@ -17,9 +17,12 @@ class UnusualValue:
         The question: the value seen, what is usual, and why it matters.
     kind : str
         The question without figures and elements: the same for questions that one answer could settle.
+    compared : tuple of str
+        The component's other variables whose values the question is about as well.
     """
 
     name: str
     place: str
     text: str
     kind: str
+    compared: tuple[str, ...] = ()

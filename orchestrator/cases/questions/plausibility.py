@@ -5,7 +5,6 @@ A question is a warning: the case runs. It is answered by the key ``meant`` of t
 
 import fnmatch
 import math
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
@@ -167,8 +166,7 @@ def _is_varied(varied: Iterable[str], doubt: UnusualValue) -> bool:
     """Tell if a question is about a value that a study varies, alone or beside another."""
     component, _, variable = doubt.name.partition(".")
     for pattern, _, changed in (key.partition(".") for key in varied):
-        named = variable == changed or re.search(rf"(?<![\w.]){re.escape(changed)} = ", doubt.text)
-        if changed and named and fnmatch.fnmatchcase(component, pattern):
+        if changed in (variable, *doubt.compared) and fnmatch.fnmatchcase(component, pattern):
             return True
     return False
 
@@ -211,7 +209,8 @@ def _doubts(draft: Draft) -> Iterator[UnusualValue]:
             ):
                 text = f"{of_lead} = {lead:g} s, the lead, exceeds {of_lag} = {lag:g} s, the lag; are the two swapped?"
                 place = place_of(draft, name, of_lead, of_lag)
-                yield UnusualValue(f"{name}.{of_lead}", place, text, f"{of_lead} above {of_lag}")
+                kind = f"{of_lead} above {of_lag}"
+                yield UnusualValue(f"{name}.{of_lead}", place, text, kind, (of_lag,))
         for resistance, reactance in RESISTANCES:
             R, X = value_of(plan, resistance), value_of(plan, reactance)
             if R is not None and X is not None and R > 1.05 * X > 0:
@@ -220,7 +219,7 @@ def _doubts(draft: Draft) -> Iterator[UnusualValue]:
                 )
                 place = place_of(draft, name, resistance, reactance)
                 kind = f"{resistance} above {reactance}"
-                yield UnusualValue(f"{name}.{resistance}", place, text, kind)
+                yield UnusualValue(f"{name}.{resistance}", place, text, kind, (reactance,))
     yield from _small_units(draft)
     yield from network_doubts(draft)
     yield from source_doubts(draft)
@@ -457,7 +456,7 @@ def _broken_orders(draft: Draft, broken: Iterable[tuple[str, Rule, str]]) -> Ite
             place = place_of(draft, name, rule.smaller, rule.larger)
             warned = f"{text}; PSS/E only warns, and the equations hold with it"
             kind = f"{rule.smaller} not below {rule.larger}"
-            yield UnusualValue(f"{name}.{rule.smaller}", place, warned, kind)
+            yield UnusualValue(f"{name}.{rule.smaller}", place, warned, kind, (rule.larger,))
 
 
 # -- several components ------------------------------------------------------------------------------

@@ -132,7 +132,9 @@ def _line(draft: Draft, name: str, grid: ComponentPlan, line: Line) -> Iterator[
             f"{COMPENSATION.low:g} to {COMPENSATION.high:g} ({COMPENSATION.why})"
         )
         name_of_capacitor = f"{name}.{variables['X_C']}"
-        yield UnusualValue(name_of_capacitor, place("X_C"), text, "series compensation")
+        kind = "series compensation"
+        compared = (variables["X"],)
+        yield UnusualValue(name_of_capacitor, place("X_C"), text, kind, compared)
 
 
 def _transformer(
@@ -151,10 +153,11 @@ def _transformer(
     for a, b in combinations((1, 2, 3), 2):
         X, R = value("X", a) + value("X", b), value("R", a) + value("R", b)
         names = [f"{transformer.name}.{q}_{a} + {q}_{b}" for q in "XR"]
+        windings = tuple(f"{transformer.name}.{q}_{k}" for q in "XR" for k in (a, b))
         for doubt in outside(draft, name, names[0], X, LINE_X, place("X", a, b)):
-            yield replace(doubt, name=f"{name}.{transformer.name}.X_{a}")
+            yield replace(doubt, name=f"{name}.{windings[0]}", compared=windings[1:2])
         for doubt in _swapped(name, names[1], names[0], R, X, place("R", a, b)):
-            yield replace(doubt, name=f"{name}.{transformer.name}.R_{a}")
+            yield replace(doubt, name=f"{name}.{windings[2]}", compared=windings)
     for k in (1, 2, 3):
         if transformer.has_ratio(k - 1):
             tap, shift = f"{transformer.name}.tap_{k}", f"{transformer.name}.shift_{k}"
@@ -176,7 +179,7 @@ def _swapped(
     if R > MOST_R_OVER_X * X > 0:
         text = f"{resistance} = {R:g} pu is {R / X:.3g} times {reactance} = {X:g} pu; are the two swapped?"
         kind = "a resistance above the reactance"
-        yield UnusualValue(f"{component}.{resistance}", place, text, kind)
+        yield UnusualValue(f"{component}.{resistance}", place, text, kind, (reactance,))
 
 
 def _place(draft: Draft, kind: str, element: str, key: str, *variables: str) -> str:

@@ -211,7 +211,8 @@ def _own_converters(draft: Draft) -> Iterator[UnusualValue]:
                 )
                 kind = "a converter that draws power" if P < 0 else "a converter with little power"
                 text = f"P_0 = {P:g} pu: it {said}; is it so?"
-                yield UnusualValue(f"{port.name}.P_0", place, text, kind)
+                compared = () if P < 0 else ("S_n",)
+                yield UnusualValue(f"{port.name}.P_0", place, text, kind, compared)
         elif plan.kind != "converter":
             beside += P * S_n
     less, fed = sum(left.values()), sum(own.values()) + beside

@@ -399,6 +399,33 @@ def test_a_rating_that_moves_a_power_is_asked_about(values, moves):
     assert [moves in text for text in found] == [True] * bool(moves), found
 
 
+@pytest.mark.parametrize(
+    ("value", "other"),
+    [
+        ({"vsc.filter.R_c": 0.5}, "filter.X_c"),
+        ({"sg.transformer.R_t": 0.5}, "transformer.X_t"),
+        ({"sg.machine.X_q": 2.5}, "machine.X_d"),
+        ({"grid.R_l23": 0.5}, "X_l23"),
+    ],
+)
+def test_a_question_about_two_values_is_none_where_a_study_varies_the_other(tmp_path, value, other):
+    """Each question names the second value in its text; a study that varies it means what it compares."""
+    (name,) = value
+    component = name.partition(".")[0]
+    path = tmp_path / "case.toml"
+    path.write_text(CASE, encoding="utf-8")
+
+    def asked(*varied):
+        case = replace(load_case(path), varied=frozenset(varied))
+        (prepared,) = case.prepare((), value)
+        return [q.text for q in prepared.questions if f"{other} = " in q.text]
+
+    assert len(asked()) == 1
+    assert asked("vsc.droop.R_f", f"{component}.internal_step") == asked()
+    assert asked(f"{component}.{other}") == []
+    assert asked(f"*.{other}") == []
+
+
 def test_questions_about_two_values_at_one_place_both_stay():
     found = SimpleNamespace(questions=[])
     given = SimpleNamespace(case=SimpleNamespace(meant=()))

@@ -134,8 +134,6 @@ _PATTERNS = {"match", "search", "fullmatch", "findall", "finditer", "sub"}
 
 ALLOWED = {
     "orchestrator/simulation/federation/helics_calls.py": 1,  # what the library of HELICS says
-    # the variables that a doubt compares, as long as it has only the name of one
-    "orchestrator/cases/questions/plausibility.py": 1,
     # the unit of a finding's figure, as long as records of certificates have none
     "orchestrator/studies/certification/margins.py": 1,
 }
