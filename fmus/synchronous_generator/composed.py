@@ -25,21 +25,23 @@ def synchronous_generator(
     exciter: str = "manual",
     governor: str = "constant_torque",
     stabilizer: str = NONE,
+    oel: str = NONE,
+    uel: str = NONE,
 ) -> Model:
     """Generator of these parts with stator transients.
 
     Parameters
     ----------
-    machine, exciter, governor, stabilizer
-        Names of `parts.MACHINES`, `parts.EXCITERS`, `parts.GOVERNORS` and `parts.STABILIZERS`; a governor with an end
-        of `parts.WITH_POD` has a POD-P.
+    machine, exciter, governor, stabilizer, oel, uel
+        Names of `parts.MACHINES`, `parts.EXCITERS`, `parts.GOVERNORS`, `parts.STABILIZERS`, `parts.OELS` and
+        `parts.UELS`; a governor with an end of `parts.WITH_POD` has a POD-P.
 
     Raises
     ------
     ValueError
         If there is no such part, the parts do not fit each other, or the machine is one for phasors alone.
     """
-    parts = chosen_parts(machine, exciter, governor, stabilizer)
+    parts = chosen_parts(machine, exciter, governor, stabilizer, (oel, uel))
     m = ModelBuilder(parts.model_name(), parts.title("EMT-type"), kind="machine", usual=MACHINE)
     S_n = declare_rating(m, S_N)
     port = device_port_of(m, S_n, P_0, LARGEST_POWER_ON_BASE)
@@ -49,7 +51,9 @@ def synchronous_generator(
             f"machine = {machine!r}: its emf is that of rated speed, which stator transients contradict; take "
             "machine = 'genrou', or model = 'synchronous_generator_phasor'"
         )
-    made = with_controls(m, port, g, parts.exciter, parts.governor, parts.stabilizer)
+    made = with_controls(
+        m, port, g, parts.exciter, parts.governor, parts.stabilizer, limiters=parts.limiters
+    )
     return replace(made, of_parts=True)
 
 
@@ -58,12 +62,14 @@ def synchronous_generator_phasor(
     exciter: str = "manual",
     governor: str = "constant_torque",
     stabilizer: str = NONE,
+    oel: str = NONE,
+    uel: str = NONE,
 ) -> Model:
     """Generator of these parts without stator transients, an emf behind an impedance.
 
     Parameters
     ----------
-    machine, exciter, governor, stabilizer
+    machine, exciter, governor, stabilizer, oel, uel
         As `synchronous_generator`.
 
     Raises
@@ -71,7 +77,7 @@ def synchronous_generator_phasor(
     ValueError
         If there is no such part, or the parts do not fit each other.
     """
-    parts = chosen_parts(machine, exciter, governor, stabilizer)
+    parts = chosen_parts(machine, exciter, governor, stabilizer, (oel, uel))
     m = phasor_builder(
         parts.model_name("phasor"), parts.title("phasor type"), kind="machine", usual=MACHINE
     )
@@ -83,5 +89,7 @@ def synchronous_generator_phasor(
             "speed_in_emf", not g.at_rated_speed, "Emf is w·e''; else e'', as of rated speed"
         )
     g = replace(g, S_n=S_n, emf_speed=if_else(with_speed, g.w, 1))
-    made = phasor_with_controls(m, port, g, parts.exciter, parts.governor, parts.stabilizer)
+    made = phasor_with_controls(
+        m, port, g, parts.exciter, parts.governor, parts.stabilizer, limiters=parts.limiters
+    )
     return replace(made, of_parts=True)

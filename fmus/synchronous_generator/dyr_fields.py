@@ -48,15 +48,16 @@ class DyrField:
 class DyrRecord:
     """One kind of record.
 
-    ``kind``: key of the component's table: ``machine``, ``exciter``, ``governor`` or ``stabilizer``; ``compensator``
-    for what an exciter measures, which is no part of its own; ``converter`` for a record that is a whole component, to
-    which ``electrical`` and ``plant`` may belong as its control and its plant's, ``shaft``, ``aerodynamics``, ``pitch``
-    and ``torque`` as its wind turbine's; ``load`` for one that is a load's;
+    ``kind``: key of the component's table: ``machine``, ``exciter``, ``governor``, ``stabilizer``, ``oel`` or ``uel``;
+    ``compensator`` for what an exciter measures, which is no part of its own; ``converter`` for a record that is a
+    whole component, to which ``electrical`` and ``plant`` may belong as its control and its plant's, ``shaft``,
+    ``aerodynamics``, ``pitch`` and ``torque`` as its wind turbine's; ``load`` for one that is a load's;
     ``part``: its value, the name of our part; for a whole component, its model;
     ``fields``: in the file's order; ``lacks``: parameters of our part that 0 leaves out, as the record has none;
     ``omissions``: what our part leaves out where a field, by its name, is not 0;
     ``without``: switches of our part that are off, as the record does not have what they switch; ``switched_on``:
-    those that are on, as the record always has it."""
+    those that are on, as the record always has it; ``sums``: limiters, by their kind, whose signal an exciter adds to
+    its voltage reference: always, or where a field has a value, as ``UEL=1``."""
 
     kind: str
     part: str
@@ -65,6 +66,7 @@ class DyrRecord:
     omissions: Mapping[str, str] = field(default_factory=dict)
     without: tuple[str, ...] = ()
     switched_on: tuple[str, ...] = ()
+    sums: Mapping[str, str] = field(default_factory=dict)
 
 
 SIGNALS_OF_BUSES = (2, 5, 6)
@@ -82,6 +84,8 @@ _SCOPES = {
     "governor": "governor.",
     "stabilizer": "pss.",
     "compensator": "exciter.",
+    "oel": "oel.",
+    "uel": "uel.",
     "converter": "",
     "load": "",
     "electrical": "electrical.",
@@ -141,6 +145,7 @@ def _record(table: Mapping[str, Any]) -> DyrRecord:
         table.get("omissions", {}),
         without=names_of("without"),
         switched_on=names_of("switched_on"),
+        sums=table.get("sums", {}),
     )
 
 

@@ -4,6 +4,7 @@ from functools import partial
 
 from fmus.synchronous_generator.declarations import MACHINE
 from fmus.synchronous_generator.excitation.common import Exciter, Regulated
+from fmus.synchronous_generator.limiters.common import WITHOUT, Limiters
 from fmus.synchronous_generator.machine import (
     Machine,
     declare_machine,
@@ -66,6 +67,7 @@ def with_controls(
     exciter: Exciter,
     governor: Governor,
     stabilizer: Stabilizer | None,
+    limiters: Limiters = WITHOUT,
 ) -> Model:
     """A machine with stator transients and its controls."""
     shaft = seen_by_controls(m, g, port, terminal_voltage(g, port, g.field_current))
@@ -78,7 +80,7 @@ def with_controls(
         i=g.current,
         v_0=g.start.terminal(g.R_t, g.X_t),
     )
-    E_fd, v_t = exciter(m, seen)
+    E_fd, v_t = limiters.regulate(m, seen, exciter)
     P_m = governor(m, shaft)
     m.close(shaft.P_m, P_m)
     machine_equations(m, g, port, E_fd, P_m)

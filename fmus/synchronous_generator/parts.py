@@ -24,6 +24,9 @@ from fmus.synchronous_generator.excitation.rotating import (
 from fmus.synchronous_generator.excitation.static import scrx, sexs, st1a, st4b
 from fmus.synchronous_generator.excitation.two_limits import bbsex1
 from fmus.synchronous_generator.excitation.without_regulator import external, manual
+from fmus.synchronous_generator.limiters.common import Limiter, Limiters
+from fmus.synchronous_generator.limiters.overexcitation import maxex1, maxex2
+from fmus.synchronous_generator.limiters.underexcitation import mnlex2
 from fmus.synchronous_generator.machine import FluxDeclaration, Machine
 from fmus.synchronous_generator.machines.classical import classical
 from fmus.synchronous_generator.machines.standard import (
@@ -64,7 +67,7 @@ MachinePart = Callable[[ModelBuilder, DevicePort, Expr, FluxDeclaration], Machin
 """Declares a machine: builder, port with the operating point, rating [MVA], and how the stator's fluxes are declared:
 as states, or as signals that a model without stator transients closes."""
 
-NONE = "none"  # the stabiliser of a generator that has none
+NONE = "none"  # the stabiliser or limiter of a generator that has none
 
 MACHINES: dict[str, MachinePart] = {
     "classical": classical,
@@ -144,6 +147,10 @@ STABILIZERS: dict[str, Stabilizer | None] = {
     "pod": pod,
     "pod_input": pod_input,
 }
+OELS: dict[str, Limiter | None] = {NONE: None, "maxex1": maxex1, "maxex2": maxex2}
+UELS: dict[str, Limiter | None] = {NONE: None, "mnlex2": mnlex2}
+"""Limiters of over- and of underexcitation."""
+
 WITH_POD = {"_pod": False, "_pod_input": True}
 """Ends of a governor's name that give it a POD-P, and whether that acts on a frequency at an input."""
 
@@ -158,10 +165,11 @@ class Parts:
     exciter: Exciter
     governor: Governor
     stabilizer: Stabilizer | None
+    limiters: Limiters
     names: tuple[str, ...]
 
     def model_name(self, suffix: str = "") -> str:
-        """``synchronous_generator_<machine>_<exciter>_<governor>[_<stabiliser>]``, with a suffix."""
+        """``synchronous_generator_<machine>_<exciter>_<governor>[_<stabiliser>][_<limiter>]``, with a suffix."""
         return "_".join(["synchronous_generator", *self.names, *([suffix] if suffix else [])])
 
     def title(self, kind: str) -> str:
@@ -171,14 +179,22 @@ class Parts:
         )
 
 
-def chosen_parts(machine: str, exciter: str, governor: str, stabilizer: str) -> Parts:
-    """The parts of these names."""
+def chosen_parts(
+    machine: str,
+    exciter: str,
+    governor: str,
+    stabilizer: str,
+    limiters: tuple[str, str] = (NONE, NONE),
+) -> Parts:
+    """The parts of these names; ``limiters``: of over- and of underexcitation."""
+    oel, uel = limiters
     found = Parts(
         _part("machine", MACHINES, machine),
         _part("exciter", EXCITERS, exciter),
         _governor(governor),
         _part("stabilizer", STABILIZERS, stabilizer),
-        (machine, exciter, governor, *([stabilizer] if stabilizer != NONE else [])),
+        Limiters(_part("oel", OELS, oel), _part("uel", UELS, uel)),
+        (machine, exciter, governor, *(n for n in (stabilizer, *limiters) if n != NONE)),
     )
     if machine == "classical" and exciter != "manual":
         raise ValueError(
@@ -189,6 +205,13 @@ def chosen_parts(machine: str, exciter: str, governor: str, stabilizer: str) -> 
         raise ValueError(
             f"stabilizer = {stabilizer!r}: it acts on a voltage regulator, and manual excitation has none; leave the "
             "stabilizer out, or take another exciter"
+        )
+    acting = next((x for x in zip(("oel", "uel"), limiters, strict=True) if x[1] != NONE), None)
+    if exciter == "manual" and acting is not None:
+        kind, name = acting
+        raise ValueError(
+            f"{kind} = {name!r}: it acts on a voltage regulator, and manual excitation has none; leave the {kind} out, "
+            "or take another exciter"
         )
     return found
 

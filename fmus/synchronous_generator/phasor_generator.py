@@ -15,6 +15,7 @@ from functools import partial
 
 from fmus.synchronous_generator.declarations import MACHINE
 from fmus.synchronous_generator.excitation.common import Exciter, Regulated
+from fmus.synchronous_generator.limiters.common import WITHOUT, Limiters
 from fmus.synchronous_generator.machine import (
     Machine,
     declare_machine,
@@ -73,6 +74,7 @@ def with_controls(
     exciter: Exciter,
     governor: Governor,
     stabilizer: Stabilizer | None,
+    limiters: Limiters = WITHOUT,
 ) -> Model:
     """A machine without stator transients, its stator's fluxes as open signals, and its controls."""
     emf = Phasor(g.d.emf, g.q.emf) * (g.w if g.emf_speed is None else g.emf_speed)
@@ -89,7 +91,7 @@ def with_controls(
         i=g.current,
         v_0=g.start.terminal(g.R_t, g.X_t),
     )
-    E_fd, _ = exciter(m, seen)
+    E_fd, _ = limiters.regulate(m, seen, exciter)
     P_m = governor(m, shaft)
     m.close(shaft.P_m, P_m)
     rotor_equations(m, g, port, E_fd, P_m)

@@ -22,7 +22,7 @@ def with_part(kind, name):
     if kind == "compensator":
         return synchronous_generator(exciter="st1a")
     return synchronous_generator(
-        **({"exciter": "st1a"} if kind == "stabilizer" else {}) | {kind: name}
+        **({"exciter": "st1a"} if kind in ("stabilizer", "oel", "uel") else {}) | {kind: name}
     )
 
 
@@ -72,6 +72,8 @@ def test_the_catalogue_knows_which_models_have_parts():
         "exciter": "manual",
         "governor": "constant_torque",
         "stabilizer": "none",
+        "oel": "none",
+        "uel": "none",
     }
     assert parts_of("synchronous_generator") == parts_of("synchronous_generator_phasor") == expected
     assert parts_of("gfor") == {}

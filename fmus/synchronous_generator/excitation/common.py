@@ -41,6 +41,7 @@ class Regulated:
     terminal: TerminalVoltage
     I_fd: Expr  # 1 pu gives 1 pu of voltage on open circuit
     v_s: Scalar = 0.0  # added to the voltage reference [pu, S_n]
+    v_s_0: Scalar = 0.0  # the same in steady state
     i: Phasor = ZERO
     v_0: Phasor = ZERO
 
@@ -90,7 +91,7 @@ class Measurement:
         m = self._m
         V_ref = m.calculated(
             "V_ref",
-            self.at_start + at_start,
+            self.at_start + at_start - self._seen.v_s_0,
             "pu",
             "Voltage reference of the operating point",
             base="S_n",

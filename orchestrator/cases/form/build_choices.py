@@ -16,7 +16,7 @@ ALPHA = "units.alpha"
 MODELS = "models"  # key of the kind of all models, EMT or phasor; see `model_kinds`
 _NATIVE = "native"
 
-PARTS = ("machine", "exciter", "governor", "stabilizer")
+PARTS = ("machine", "exciter", "governor", "stabilizer", "oel", "uel")
 """Keys of a component's table, of ``[units]`` and columns of its file that choose the parts of a generator."""
 
 RECORDS = "records"

@@ -91,6 +91,8 @@ class ComponentTable(Table):
     exciter: str | None = None
     governor: str | None = None
     stabilizer: str | None = None
+    oel: str | None = None
+    uel: str | None = None
     records: str | None = None
     parameters: dict[str, Any] = {}
     inputs: dict[str, Any] = {}
@@ -235,6 +237,8 @@ class UnitsTable(Table):
     exciter: str | None = None
     governor: str | None = None
     stabilizer: str | None = None
+    oel: str | None = None
+    uel: str | None = None
     generator_parameters: dict[str, Any] = {}
     converter_parameters: dict[str, Any] = {}
 

@@ -122,7 +122,7 @@ RESISTANCES = (
 # apparent power [pu of the rating] above which a converter's operating point is questioned
 _FULL = 1.05
 _LONG = 0.01  # step of phasor models [s] above which it is questioned
-_OF_PARTS = ("machine", "exciter", "governor", "pss")
+_OF_PARTS = ("machine", "exciter", "governor", "pss", "oel", "uel")
 """Begins of a generator's variables; another scenario may choose a part that has one which this one's has not."""
 
 _LEADS = (

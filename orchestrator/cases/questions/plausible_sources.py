@@ -17,7 +17,14 @@ from orchestrator.systems.coupling.system import ComponentPlan
 SOLVED = "solved"  # of the grid, in ``meant``: the source's voltages are a flat start on purpose
 # usual reactances of step-up transformers on the machine's rating [pu], widened
 _STEP_UP = (0.03, 0.35)
-_PARTS = {"machine": "machine", "exciter": "exciter", "governor": "governor", "pss": "stabilizer"}
+_PARTS = {
+    "machine": "machine",
+    "exciter": "exciter",
+    "governor": "governor",
+    "pss": "stabilizer",
+    "oel": "oel",
+    "uel": "uel",
+}
 _SHOWN = 3  # machines beyond which one is compared with the others
 _LITTLE = 0.05  # loading below which it is questioned [pu]
 _SAME = 0.05  # part by which two powers may differ

@@ -64,7 +64,14 @@ def with_port(name: str, port: Port, known: tuple[str, ...]) -> str:
     )
 
 
-_SUCH_AS = {"machine": "genrou", "exciter": "sexs", "governor": "tgov1", "stabilizer": "pss1a"}
+_SUCH_AS = {
+    "machine": "genrou",
+    "exciter": "sexs",
+    "governor": "tgov1",
+    "stabilizer": "pss1a",
+    "oel": "maxex2",
+    "uel": "mnlex2",
+}
 
 _NEEDS = (
     "A Python-backed FMU needs a host that is a program in Python (3.8 or newer), such as FMPy; for others add "

@@ -93,6 +93,8 @@ def _stabiliser(stage: int, lead: str, lag: str, **further: object) -> Limit:
 
 
 MACHINE_LIMITS = (
+    Limit("limiter of overexcitation", "oel.acts", None),
+    Limit("limiter of underexcitation", "uel.acts", None),
     # SEXS; IEEET1 and DC1A; AC1A, whose amplifier has two pairs of limits; AC4A without the rectifier's loading; ST1A.
     _exciter("ceiling of the exciter", "amplifier", "E_MAX", "E_MIN"),
     _exciter(

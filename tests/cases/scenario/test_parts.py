@@ -164,7 +164,7 @@ def test_a_part_is_a_choice_and_a_parameter_of_it_a_value():
     layer = layer_of({"g1.exciter": "sexs", "g1.exciter.K": 90.0}, lambda key: key, has_units=False)
     assert [(c.pattern, c.part, c.name) for c in layer.parts] == [("g1", "exciter", "sexs")]
     assert dict(layer.values) == {"g1.exciter.K": 90.0}
-    assert set(PARTS) == {"machine", "exciter", "governor", "stabilizer"}
+    assert set(PARTS) == {"machine", "exciter", "governor", "stabilizer", "oel", "uel"}
     assert set(CHOICES) == {*PARTS, "records"}
 
 

@@ -10,6 +10,7 @@ from orchestrator.cases.form.unusual_value import UnusualValue
 from orchestrator.cases.networks.data import bus_name
 from orchestrator.cases.networks.psse.dyr import machine_models
 from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
+from orchestrator.cases.networks.psse.limiter_records import LIMITERS
 from orchestrator.cases.networks.psse.machine_model import (
     CLASSICAL,
     COMPENSATION,
@@ -22,6 +23,12 @@ from orchestrator.core.errors import InputError
 
 _WITHOUT = {"exciter": MANUAL, "governor": "constant_power", "stabilizer": "none"}
 """What PSS/E assumes where there is no record."""
+
+_ON_EXCITERS = ("stabilizer", *LIMITERS)
+"""Parts that act on a voltage regulator."""
+
+_IDLE = {"stabiliser": ("pss",), "limiter": LIMITERS}
+"""Scopes of what acts on nothing at a machine without an exciter, by its kind; a compensator is the exciter's own."""
 
 # what is constant without the part
 _CONSTANT = {"exciter": "field voltage", "governor": "mechanical power"}
@@ -54,7 +61,7 @@ def _fits(kind: str, name: str, row: UnitRow) -> bool:
     """Return whether a choice is for this machine: no record says otherwise, and the machine can have the part."""
     if kind == "machine":
         return row.parts.get("machine") == MACHINE_VARIANTS.get(name, name)
-    classical = row.parts.get("machine") == "classical" and kind in ("exciter", "stabilizer")
+    classical = row.parts.get("machine") == "classical" and kind in ("exciter", *_ON_EXCITERS)
     return kind not in row.parts and not classical
 
 
@@ -87,9 +94,10 @@ def _without_idle_controls(row: UnitRow, place: str) -> UnitRow:
     if row.parts.get("exciter", MANUAL) != MANUAL or row.converter is not None:
         return row
     kinds = {
-        "stabiliser": [name for name in own if name.startswith("pss.")],
-        "compensator": [name for name in own if name in COMPENSATION],
+        kind: [name for name in own if name.partition(".")[0] in scopes]
+        for kind, scopes in _IDLE.items()
     }
+    kinds["compensator"] = [name for name in own if name in COMPENSATION]
     doubts = [
         DoubtOfRecord(
             names[0],
@@ -104,7 +112,7 @@ def _without_idle_controls(row: UnitRow, place: str) -> UnitRow:
     idle = {name for names in kinds.values() for name in names}
     return replace(
         row,
-        parts={kind: part for kind, part in row.parts.items() if kind != "stabilizer"},
+        parts={kind: part for kind, part in row.parts.items() if kind not in _ON_EXCITERS},
         parameters={**row.parameters, "sg": {k: x for k, x in own.items() if k not in idle}},
         doubts=(*row.doubts, *doubts),
     )

@@ -4,8 +4,10 @@ from collections.abc import Collection, Sequence
 
 from fmus.grid_following.dyr_fields import FIELDS, MODEL
 from orchestrator.cases.networks.psse.dyr_records import EVENT, NUMBERED, DynamicRecord
+from orchestrator.cases.networks.psse.limiter_records import UNHEARD, unheard_limiters
 from orchestrator.cases.networks.psse.machine_model import MANUAL
 from orchestrator.cases.networks.psse.missing_models import (
+    LIMITER,
     OF_MACHINES,
     RESTS,
     is_resting,
@@ -13,6 +15,9 @@ from orchestrator.cases.networks.psse.missing_models import (
     names_load,
 )
 from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
+
+_AT_EXCITERS = ("stabilizer", "compensator", LIMITER)
+"""Kinds of models that act on a voltage regulator."""
 
 
 def record_uses(
@@ -36,6 +41,7 @@ def record_uses(
         if exciter not in (None, MANUAL)
         or (kind_of(record.name) == "exciter" and record.name not in left)
     }
+    unheard = unheard_limiters(records, left)
     return [
         RecordUse(
             record.file,
@@ -44,7 +50,7 @@ def record_uses(
             *(
                 (UseOfRecord.NOT_USED, "a converter of ours replaces its machine", False)
                 if (record.bus, record.machine) in ours
-                else _use_of(record, machines, idle, left, approximate, excited)
+                else _use_of(record, machines, idle, left, approximate, excited, unheard=unheard)
             ),
         )
         for record in records
@@ -58,6 +64,8 @@ def _use_of(
     left: Collection[str],
     approximate: bool,
     excited: Collection[tuple[int, str]],
+    *,
+    unheard: Collection[DynamicRecord],
 ) -> tuple[UseOfRecord, str, bool]:
     """Return what became of a record, why, and whether it is of no machine."""
     key = record.bus, record.machine
@@ -69,8 +77,10 @@ def _use_of(
             return UseOfRecord.NOT_USED, "dyr_leave_out names it", False
         if is_resting(record.name):
             return UseOfRecord.NOT_USED, RESTS, False
-        if key not in excited and kind_of(record.name) in ("stabilizer", "compensator"):
+        if key not in excited and kind_of(record.name) in _AT_EXCITERS:
             return UseOfRecord.NOT_USED, "its machine has no exciter", False
+        if record in unheard:
+            return UseOfRecord.NOT_USED, UNHEARD, False
         stand_in = f"approximated as {MODEL}" if approximate and record.name in FIELDS else ""
         return UseOfRecord.USED, stand_in, False
     if key in idle and not of_load:

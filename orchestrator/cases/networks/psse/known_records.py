@@ -17,12 +17,14 @@ from orchestrator.cases.networks.psse.composite_loads import COMPOSITE_NAMES
 from orchestrator.cases.networks.psse.composite_loads import MODEL as MODEL_OF_MOTORS
 from orchestrator.cases.networks.psse.dyr_records import NUMBERED
 from orchestrator.cases.networks.psse.frequency_records import FREQUENCY_RECORDS
+from orchestrator.cases.networks.psse.limiter_records import LIMITERS
 from orchestrator.cases.networks.psse.load_records import LOAD_RECORDS
 from orchestrator.cases.networks.psse.motor_loads import MOTOR_NAMES
 from orchestrator.cases.networks.psse.relay_records import LOAD_RELAYS, OF_BUSES
 
 _LIBRARY = "PSS/E's model library as PowerWorld's and NEPLAN's guides and ANDES' reader describe it"
 _COMPENSATORS = "PowerWorld's guide to PSS/E's models; CSVGN5 and SVSMO1 as InterPSS reads them"
+_OF_LIMITERS = "IEC 61970-302, STEPSS' page of RAMSES' exciters, Dynawo, OpenIPSL"
 _REGFM = "WECC's specification of REGFM_A1"
 _REGFM_B1 = "WECC's specification of REGFM_B1, in PNNL's script for PSS/E"
 _LOADS = "GridPACK's reader and model"
@@ -60,7 +62,13 @@ class KnownRecord:
 def known_records() -> list[KnownRecord]:
     """All records, by kind in the order of the tables that hold them."""
     found = [
-        KnownRecord(name, record.kind, record.part, _LIBRARY, "; ".join(_limits(record)))
+        KnownRecord(
+            name,
+            _KINDS.get(record.kind, record.kind),
+            record.part,
+            _OF_LIMITERS if record.kind in LIMITERS else _LIBRARY,
+            "; ".join(_limits(record)),
+        )
         for name, record in DYR_RECORDS.items()
     ]
     found += [
@@ -127,6 +135,8 @@ def _peers() -> dict[str, str]:
 
 
 _KINDS = {
+    "oel": "limiter of overexcitation",
+    "uel": "limiter of underexcitation",
     "converter": "converter",
     "electrical": "converter control",
     "plant": "plant control",
@@ -135,7 +145,7 @@ _KINDS = {
     "pitch": "plant pitch control",
     "torque": "plant torque control",
 }
-"""Words for the kinds of a plant's records."""
+"""Words for the kinds of limiters and of a plant's records."""
 
 
 def _of_plant(name: str) -> Iterator[str]:

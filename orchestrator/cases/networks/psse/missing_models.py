@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
 from orchestrator.cases.form.remedies import replacement_of, without_models
 from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
 from orchestrator.cases.networks.psse.raw_network import Machine
@@ -13,6 +14,7 @@ from orchestrator.cases.networks.psse.raw_network import Machine
 MACHINE = "machine"
 DEVICE = "device"
 LOAD = "load"
+LIMITER = "limiter"
 
 UNKNOWN = "unknown"
 OF_MACHINES = (
@@ -116,8 +118,9 @@ _RESTING = ("MAXEX", "MNLEX", "UEL", "OEL", "SCL")
 
 
 def is_resting(name: str) -> bool:
-    """Return whether a model is a limiter of excitation, which is passed over."""
-    return kind_of(name) == "limiter" and name.startswith(_RESTING)
+    """Return whether a model is a limiter of excitation without a part of ours, which is passed over."""
+    without = name not in DYR_RECORDS and kind_of(name) == LIMITER
+    return without and name.startswith(_RESTING)
 
 
 def missing_models(

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from orchestrator.cases.form.schema import LoadModelTable
 from orchestrator.cases.networks.psse.composite_loads import COMPOSITE_NAMES
 from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
+from orchestrator.cases.networks.psse.limiter_records import UNHEARD
 from orchestrator.cases.networks.psse.missing_models import (
     DEVICE,
     OF_MACHINES,
@@ -77,6 +78,12 @@ def unused_models(
             f"{record.name} is {RESTS}: it acts at limits only. Does the machine start within them?"
         )
         changes.note(record.line, Remark(text, RESTS))
+    for record in _named_in(records, uses, UNHEARD):
+        text = (
+            f"{record.name} is not used: it is {UNHEARD}, and gfor has no gate for it. It acts at limits only. "
+            "Does the machine start within them?"
+        )
+        changes.note(record.line, Remark(text, UNHEARD))
     return [*_strays(records, unused), *changes.as_problems()]
 
 

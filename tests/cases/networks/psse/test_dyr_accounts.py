@@ -254,15 +254,15 @@ def test_an_event_of_andes_is_no_record_and_told(tmp_path):
 
 
 def test_a_limiter_of_excitation_rests_and_is_asked_about(tmp_path):
-    """MAXEX1 acts beyond the rated field current only; a network with one is read."""
-    records = read(tmp_path, CLASSICAL + "2 'MAXEX1' 1 3.1 30 1.1 20 1.2 10 0.1 0 -0.2 /\n")
+    """MNLEX1, whose diagram is not public, acts at its limit only; a network with one is read."""
+    records = read(tmp_path, CLASSICAL + "2 'MNLEX1' 1 0.1 0.1 1.0 0.3 0.5 0.1 /\n")
     assert machine_models(records, MACHINES)[2, "1"].parts == {"machine": "classical"}
     keys = {(machine.bus, machine.name.strip()) for machine in MACHINES}
     uses = record_uses(records, keys, ())
-    assert [use.use for use in uses if use.kind == "MAXEX1"] == [UseOfRecord.NOT_USED]
+    assert [use.use for use in uses if use.kind == "MNLEX1"] == [UseOfRecord.NOT_USED]
     (asked,) = unused_models(records, uses)
     assert asked.place.endswith("grid.dyr, line 4")
-    assert "MAXEX1 is a limiter of excitation, taken to rest at the operating point" in asked.text
+    assert "MNLEX1 is a limiter of excitation, taken to rest at the operating point" in asked.text
 
 
 def test_a_static_var_compensator_that_is_missing_is_no_record_that_may_go(tmp_path):

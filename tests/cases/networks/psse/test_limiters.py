@@ -1,0 +1,107 @@
+"""Limiters of excitation in dynamics data: parts of their machines, or not used because their exciter does not hear."""
+
+import pytest
+
+from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
+from orchestrator.cases.networks.psse.dyr import machine_models
+from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.dyr_uses import record_uses
+from orchestrator.cases.networks.psse.raw_network import Machine
+from orchestrator.cases.networks.psse.unused_models import unused_models
+from orchestrator.cases.networks.record_use import UseOfRecord
+
+GENROU = "1 'GENROU' 1 8 0.03 0.4 0.05 6 0 1.8 1.7 0.3 0.55 0.25 0.2 0 0 /\n"
+MAXEX1 = "1 'MAXEX1' 1 2.5 1.1 120 1.2 40 1.5 15 1.0 0.002 -0.5 /\n"
+MAXEX2 = "1 'MAXEX2' 1 0 2.5 1.1 120 1.2 40 1.5 15 1.0 0.002 -0.5 /\n"
+MNLEX2 = "1 'MNLEX2' 1 0.1 1 0.3 0.5 0.1 2.5 3 /\n"
+SEXS = "1 'SEXS' 1 0.1 10 100 0.1 0 5 /\n"
+ESST1A = "1 'ESST1A' 1 {} 1 0.01 99 -99 0 0 0 0 100 0.02 9 -9 9 -9 0 0 1 0 0 /\n"
+ESAC1A = "1 'ESAC1A' 1 0.01 0 0 100 0.02 9 -9 0.8 0.03 1 0.2 0.38 1 4.18 0.1 3.14 0.03 6 -5 /\n"
+
+
+def read(tmp_path, text, leaving_out=()):
+    place = tmp_path / "grid.dyr"
+    place.write_text(text)
+    records = read_dyr(place)
+    machine = Machine(1, "1", 1, 80.0, 1.0, 100.0, 0.25j, -9e3, 9e3)
+    model = machine_models(records, [machine], leaving_out)[1, "1"]
+    uses = record_uses(records, {(1, "1")}, (), leaving_out)
+    return model, uses, unused_models(records, uses)
+
+
+def test_a_limiter_is_a_part_with_its_fields_in_the_files_order(tmp_path):
+    model, uses, asked = read(tmp_path, GENROU + SEXS + MAXEX2 + MNLEX2)
+    assert (model.parts["oel"], model.parts["uel"]) == ("maxex2", "mnlex2")
+    own = {n: x for n, x in model.parameters.items() if n.startswith(("oel.", "uel."))}
+    assert own == {
+        "oel.of_current": 0,
+        "oel.EFDRATED": 2.5,
+        "oel.EFD1": 1.1,
+        "oel.TIME1": 120,
+        "oel.EFD2": 1.2,
+        "oel.TIME2": 40,
+        "oel.EFD3": 1.5,
+        "oel.TIME3": 15,
+        "oel.EFDDES": 1.0,
+        "oel.KMX": 0.002,
+        "oel.VLOW": -0.5,
+        "uel.K_F2": 0.1,
+        "uel.T_F2": 1,
+        "uel.K_M": 0.3,
+        "uel.T_M": 0.5,
+        "uel.MELMAX": 0.1,
+        "uel.Q_0": 2.5,
+        "uel.R": 3,
+    }
+    assert {use.use for use in uses} == {UseOfRecord.USED}
+    assert asked == []
+
+
+def used(tmp_path, *texts):
+    model, uses, asked = read(tmp_path, GENROU + "".join(texts))
+    by_name = {use.kind: use.use for use in uses}
+    assert {kind for kind in ("oel", "uel") if kind in model.parts} == {
+        DYR_RECORDS[name].kind
+        for name, use in by_name.items()
+        if use is UseOfRecord.USED and DYR_RECORDS[name].kind in ("oel", "uel")
+    }
+    prefixes = {name.partition(".")[0] for name in model.parameters}
+    assert prefixes & {"oel", "uel"} == {*model.parts} & {"oel", "uel"}
+    return {*model.parts} & {"oel", "uel"}, [one.text for one in asked]
+
+
+@pytest.mark.parametrize(
+    ("exciter", "heard"),
+    [
+        (SEXS, {"oel", "uel"}),
+        (ESST1A.format(1), {"uel"}),
+        (ESST1A.format(2), set()),
+        (ESAC1A, set()),
+    ],
+    ids=["sums both", "sums the lower", "by its field at a gate", "both at gates"],
+)
+def test_a_limiter_acts_where_its_exciter_adds_its_signal(exciter, heard, tmp_path):
+    found, asked = used(tmp_path, exciter, MAXEX1, MNLEX2)
+    assert found == heard
+    assert len(asked) == 2 - len(heard)
+    for text in asked:
+        assert "whose signal its exciter does not add to the voltage reference" in text
+
+
+def test_a_second_limiter_of_one_kind_is_refused(tmp_path):
+    with pytest.raises(Exception, match="a second oel of machine '1' at bus 1"):
+        read(tmp_path, GENROU + SEXS + MAXEX1 + MAXEX2)
+
+
+def test_a_limiter_beside_no_exciter_is_not_used(tmp_path):
+    _, uses, _ = read(tmp_path, GENROU + MAXEX1)
+    assert [(use.use, use.why) for use in uses][1] == (
+        UseOfRecord.NOT_USED,
+        "its machine has no exciter",
+    )
+
+
+def test_a_limiter_that_may_go_is_left_out(tmp_path):
+    model, uses, _ = read(tmp_path, GENROU + SEXS + MAXEX1, ["MAXEX1"])
+    assert "oel" not in model.parts
+    assert uses[-1].why == "dyr_leave_out names it"

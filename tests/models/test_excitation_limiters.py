@@ -1,0 +1,218 @@
+"""MAXEX1, MAXEX2 and MNLEX2: times and slopes by hand, the circle, and machines that end at their limits."""
+
+import numpy as np
+import pytest
+
+from fmus.synchronous_generator.composed import synchronous_generator, synchronous_generator_phasor
+from fmus.synchronous_generator.excitation.common import Regulated
+from fmus.synchronous_generator.limiters.common import Limiters
+from fmus.synchronous_generator.parts import EXCITERS, OELS, UELS
+from fmus.toolchain.frames import Phasor
+from fmus.toolchain.model_builder import ModelBuilder
+from tests.models.one_machine import OneMachine, three_buses
+from tests.models.parts import AT_BUS, BUS, CURRENT, E_FD, START, V_T, integrated, refused
+from tests.support.evaluated import Evaluated
+
+POINTS = {"EFDRATED": 2.0, "EFD1": 1.2, "TIME1": 3.0, "EFD2": 1.5, "TIME2": 1.0, "EFD3": 2.0}
+TIMED = POINTS | {"TIME3": 0.5, "EFDDES": 1.0, "KMX": 0.1, "VLOW": -0.2}
+"""At rest u = 1.1, below EFD1 = 1.2."""
+
+CIRCLE = {"K_F2": 0.0, "T_F2": 1.0, "K_M": 2.0, "T_M": 0.1, "MELMAX": 9.0, "Q_0": 1.3, "R": 1.9}
+
+
+def limiter(values, **named):
+    """A limiter between field current, field voltage and the stator's current; its regulator gives what it is given."""
+    m = ModelBuilder("alone", "The limiter alone")
+    starts = {"I_fd": E_FD, "E_fd": E_FD, "i_re": 0.7, "i_im": -0.1}
+    I_fd, E_fd, i_re, i_im = (
+        m.input(name, "pu", name, base="S_n", start=start) for name, start in starts.items()
+    )
+    terminal = Phasor(V_T + 0 * E_fd, 0.0)
+    seen = Regulated(START, lambda E: terminal, I_fd, i=Phasor(i_re, i_im), v_0=Phasor(V_T, 0.0))
+
+    def passed(m, seen):
+        m.output("v_s", seen.v_s, "pu", "Sum of the limiters' signals", base="S_n")
+        return E_fd, terminal.magnitude()
+
+    Limiters(**named).regulate(m, seen, passed)
+    (scope,) = named
+    return Evaluated(m.build(), {f"{scope}.{key}": value for key, value in values.items()})
+
+
+def overexcited(I_fd, E_fd=E_FD, end=1.0, values=TIMED, name="maxex2", x=None):
+    alone = limiter(values, oel=OELS[name])
+    assert not refused(alone)
+    found, x = integrated(alone, lambda t: [I_fd, E_fd, 0.7, -0.1], end, x=x)
+    return np.array([each["v_s"] for each in found]), x
+
+
+@pytest.mark.parametrize(
+    ("u", "time"),
+    [(1.2001, 3.0), (1.35, 2.0), (1.5, 1.0), (1.6, 0.9), (1.75, 0.75), (2.0, 0.5), (3.0, 0.5)],
+)
+def test_the_limiter_waits_for_its_inverse_time_and_then_integrates(u, time):
+    """KMX·EFDRATED·(EFDDES − u) from the time on, down to VLOW."""
+    signal, _ = overexcited(2.0 * u, end=time + 0.3)
+    moved = np.flatnonzero(signal < -1e-6)
+    assert moved[0] * 1e-3 == pytest.approx(time, abs=6e-3)
+    slope = 0.1 * 2.0 * (1.0 - u)
+    since = len(signal) - 1 - moved[0]
+    assert signal[-1] == pytest.approx(max(slope * since * 1e-3, -0.2), abs=2e-3 * abs(slope))
+
+
+def test_below_its_first_point_it_never_acts():
+    signal, _ = overexcited(2.0 * 1.19, values=TIMED | {"TIME1": 1.0}, end=2.0)
+    assert not signal.any()
+
+
+def test_the_time_is_forgotten_where_the_current_falls_below_the_first_point():
+    _, x = overexcited(2.0 * 1.5, end=0.9)
+    _, x = overexcited(2.0 * 1.1, end=0.05, x=x)
+    signal, _ = overexcited(2.0 * 1.5, end=0.9, x=x)
+    assert not (signal < -1e-6).any()
+    signal, _ = overexcited(2.0 * 1.5, end=1.1, x=x)
+    assert signal[-1] < -1e-3
+
+
+def test_it_stops_at_vlow_and_lets_go_without_winding_up():
+    """At VLOW for a second; below EFDDES it rises at once, to 0 and no further, and stays there."""
+    fast = TIMED | {"KMX": 1.0}
+    signal, x = overexcited(2.0 * 3.0, values=fast, end=1.6)
+    assert signal[-1] == pytest.approx(-0.2, rel=1e-9)
+    signal, x = overexcited(2.0 * 0.9, values=fast, end=0.4, x=x)  # 0.2 pu a second
+    assert signal[-1] == pytest.approx(-0.2 + 0.2 * 0.4, abs=1e-3)
+    signal, _ = overexcited(2.0 * 0.9, values=fast, end=0.8, x=x)
+    assert signal[-1] == pytest.approx(0.0, abs=1e-12)
+    assert signal.max() <= 0
+
+
+def test_between_what_it_wants_and_its_first_point_it_goes_on_once_it_acts():
+    _, x = overexcited(2.0 * 1.6, end=1.2)
+    signal, _ = overexcited(2.0 * 1.1, end=0.5, x=x)
+    assert np.diff(signal).max() < 0
+
+
+@pytest.mark.parametrize(("name", "of_current"), [("maxex1", None), ("maxex2", 0), ("maxex2", 1)])
+def test_maxex1_sees_the_field_voltage_and_maxex2_what_its_switch_says(name, of_current):
+    values = TIMED | ({} if of_current is None else {"of_current": of_current})
+    by_current, _ = overexcited(6.0, end=1.0, values=values, name=name)
+    by_voltage, _ = overexcited(E_FD, E_fd=6.0, end=1.0, values=values, name=name)
+    assert [s[-1] < -1e-3 for s in (by_current, by_voltage)] == [bool(of_current), not of_current]
+
+
+def test_a_start_beyond_the_first_point_rests_and_the_time_runs_above_it():
+    values = TIMED | {"EFDRATED": 1.0}  # u = 2.2 at the start
+    alone = limiter(values, oel=OELS["maxex2"])
+    assert max(map(abs, alone.rates([E_FD, E_FD, 0.7, -0.1]).values())) < 1e-12
+    signal, _ = overexcited(1.005 * E_FD, end=2.0, values=values)
+    assert not signal.any()
+    signal, _ = overexcited(1.02 * E_FD, end=2.0, values=values)
+    assert signal[-1] < -1e-3
+
+
+def excess(i, values=CIRCLE):
+    S, square = V_T * np.conj(i), V_T**2
+    far = (S.imag - values["Q_0"] * square) ** 2 + S.real**2
+    return far - (values["R"] * square) ** 2
+
+
+@pytest.mark.parametrize("angle", [-1.9, -1.571, -1.2])
+def test_mnlex2_acts_outside_of_its_circle_alone(angle):
+    """On a ray from the circle's centre downwards, 1 % within and 1 % outside of the radius."""
+    alone = limiter(CIRCLE, uel=UELS["mnlex2"])
+    assert not refused(alone)
+    for share in (0.99, 1.01):
+        S = V_T**2 * (1.3j + 1.9 * share * np.exp(1j * angle))
+        i = np.conj(S / V_T)
+        found, _ = integrated(alone, lambda t, i=i: [E_FD, E_FD, i.real, i.imag], 2.0)
+        assert found[-1]["v_s"] == pytest.approx(max(2.0 * excess(i), 0.0), rel=1e-6, abs=1e-9)
+        assert found[-1]["uel.acts"] == (share > 1)
+
+
+@pytest.mark.parametrize("K_F2", [0.0, 0.3])
+def test_mnlex2_answers_as_its_diagram(K_F2):
+    """Acting, K_M·(1+sT_F2)/((1+sT_M)·(1+sT_F2) + s·K_M·K_F2) of the excess."""
+    values = CIRCLE | {"K_F2": K_F2, "T_F2": 0.4, "R": 1.2}
+    alone = limiter(values, uel=UELS["mnlex2"])
+    i = complex(CURRENT.re, CURRENT.im)
+    assert excess(i, values) > 0
+    rest = [E_FD, E_FD, 0.7, -0.1]
+    assert max(map(abs, alone.rates(rest).values())) < 1e-9
+    h = 1e-6
+    slope = (excess(i + h * 1j, values) - excess(i - h * 1j, values)) / (2 * h)
+    for hertz in (0.1, 1.0, 6.0):
+        s = 2j * np.pi * hertz
+        lag = 1 + 0.4 * s
+        wanted = slope * 2.0 * lag / ((1 + 0.1 * s) * lag + s * 2.0 * K_F2)
+        assert alone.response(s, rest)["v_s", "i_im"] == pytest.approx(wanted, rel=1e-5)
+
+
+def test_mnlex2_stops_at_its_largest_signal_and_without_a_lag_it_is_at_once_there():
+    for T_M in (0.1, 0.0):
+        alone = limiter(CIRCLE | {"MELMAX": 0.1, "T_M": T_M}, uel=UELS["mnlex2"])
+        found, x = integrated(alone, lambda t: [E_FD, E_FD, 0.1, 2.0], 3.0)
+        assert found[-1]["v_s"] == pytest.approx(0.1, abs=1e-9)
+        back, _ = integrated(alone, lambda t: [E_FD, E_FD, 0.7, -0.1], 0.1, x=x)
+        assert back[-1]["v_s"] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("factory", [synchronous_generator, synchronous_generator_phasor])
+@pytest.mark.parametrize("name", [n for n in EXCITERS if n not in ("manual", "external")])
+def test_a_generator_with_limiters_starts_in_steady_state(name, factory):
+    """One that acts at the start has its signal in the voltage reference, which is lower by it."""
+    acting = {"uel.R": 1.05, "uel.K_M": 0.1, "uel.MELMAX": 9.0}
+    both = Evaluated(factory(exciter=name, oel="maxex1", uel="mnlex2"), AT_BUS | acting)
+    assert not refused(both)
+    at = [BUS.real, BUS.imag]
+    assert max(map(abs, both.rates(at).values())) < 1e-8
+    signal = both.outputs(at)["uel.signal"]
+    assert (signal > 1e-3, both.outputs(at)["oel.acts"]) == (True, 0)
+    alone = Evaluated(factory(exciter=name), AT_BUS)
+    lowered = alone.parameters["exciter.V_ref"] - both.parameters["exciter.V_ref"]
+    assert lowered == pytest.approx(signal, abs=1e-9)
+
+
+GENERATOR = "102 'GENROU' 1 7.4 0.03 0.5 0.05 3.1 0.0 1.25 1.2 0.35 0.5 0.25 0.06 0.0 0.0 /\n"
+EXST1 = "102 'EXST1' 1 0.01 99 -99 0 0 100 0.02 9 -9 0 0 1 /\n"
+
+
+def ends(dyr, tmp_path, changed, until):
+    network, _ = three_buses()
+    one = OneMachine(GENERATOR + EXST1 + dyr, tmp_path, network, torque=True)
+    return one.run(network.lines, until, every=0.5, changed=changed)
+
+
+def test_a_machine_that_is_asked_for_too_much_ends_at_its_desired_field(tmp_path):
+    """A step of the reference lifts the field above EFD1; after its time it comes down to EFDDES·EFDRATED = 1.9."""
+    record = "102 'MAXEX2' 1 1 2.0 1.1 4 1.2 3 1.3 2 0.95 0.1 -0.5 /\n"
+    rows = ends(record, tmp_path, {"exciter.delta_V_ref": 0.08}, until=14.0)
+    field = {time: out["E_fd"] for time, out, _ in rows}
+    assert field[0.0] < 2.2 < field[2.0]
+    assert rows[-1][1]["E_fd"] == pytest.approx(1.9, rel=2e-3)
+    assert [rows[k][1]["oel.acts"] for k in (0, 4, -1)] == [0, 0, 1]
+
+
+def test_a_machine_that_is_asked_for_too_little_ends_beside_its_circle(tmp_path):
+    """Without the limiter the reactive power goes far below; with it the excess is V_UEL/K_M."""
+    record = "102 'MNLEX2' 1 0 1 0.1 0.5 0.5 1.3 1.9 /\n"
+    step = {"exciter.delta_V_ref": -0.05}
+    free, rows = (ends(own, tmp_path, step, until=12.0) for own in ("", record))
+
+    def beyond(row):
+        v = row[2]
+        S = v[102] * np.conj((2 * v[102] - v[101] - v[103]) / (0.01 + 0.12j))
+        square = abs(v[102]) ** 2
+        return (S.imag - 1.3 * square) ** 2 + S.real**2 - (1.9 * square) ** 2
+
+    signal = rows[-1][1]["uel.signal"]
+    assert beyond(rows[-1]) == pytest.approx(signal / 0.1, rel=0.02)
+    assert 0.01 < signal < 0.05
+    assert beyond(free[-1]) > 2 * beyond(rows[-1])
+
+
+def test_limiters_need_a_regulator():
+    for named in ({"oel": "maxex1"}, {"uel": "mnlex2"}):
+        with pytest.raises(ValueError, match="it acts on a voltage regulator"):
+            synchronous_generator_phasor(exciter="manual", **named)
+    with pytest.raises(ValueError, match="did you mean 'maxex2'"):
+        synchronous_generator_phasor(exciter="sexs", oel="maxex3")
