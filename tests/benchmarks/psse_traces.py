@@ -92,7 +92,7 @@ SETS = (
 )
 
 UNREACHED = {
-    "CSVGN1": "a static var system, no machine",
+    "CSVGN1": "a static var system, no machine: tests.models.test_static_var",
     "DEGOV": "the recordings are PowerWorld's, not PSS/E's",
     "DERA": "distributed generation, no machine: tests.models.test_distributed_generation",
     "GAST (14 buses)": "several machines, by `gfor new` and `gfor run`: page of conventions",

@@ -1,4 +1,7 @@
-"""CSVGN1 against its equations by hand, its steady state and its transfer function."""
+"""CSVGN1 against its equations by hand, its steady state, its transfer function and a recording of PSS/E."""
+
+import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,6 +23,7 @@ VALUES = {
     "CBASE": 400.0,
 }
 BUS = [VALUES["v_0"], 0.0]
+TRACES = Path(__file__).parents[1] / "reference" / "psse_traces.json"
 
 
 def compensator(**values):
@@ -89,3 +93,72 @@ def test_the_reactor_ends_at_its_limits():
 def test_what_the_compensator_cannot_start_from_is_refused(values, rule):
     broken = refused(compensator(**values))
     assert any(rule in text for text in broken), broken
+
+
+class ThreeBuses:
+    """PowerSimulationsDynamics.jl's case of CSVGN1 (`3_BUS_System.raw`, pu on 100 MVA): a source behind a reactance, a
+    transformer of ratio 0.9524, two lines, and constant impedances at buses 2 and 3; the compensator is at bus 3."""
+
+    SOURCE = 0.24j * 100 / 666.6
+    LINE, CHARGING, RATIO, LEAKAGE = complex(0.023, 0.15) / 2, 2 * 0.56j / 2, 0.9524, 0.0255j
+    RATING = 500.0
+    FLOW = (
+        (1.0, 1.047277, 1.015),
+        (-7.96066, -13.53284),
+    )  # voltages [pu], angles of buses 2 and 3 [°]
+
+    def __init__(self):
+        sizes, angles = self.FLOW
+        v = np.array(sizes) * np.exp(1j * np.radians([0, *angles]))
+        i = self.passive(0, 0) @ v
+        self.emf = v[0] + self.SOURCE * i[0]
+        self.loads = [np.conj(4.55 + 0.01j) / abs(v[1]) ** 2, np.conj(1.4 + 0.95j) / abs(v[2]) ** 2]
+        self.after = np.conj(4.0 + 0.01j) / abs(v[1]) ** 2
+        self.q = (v[2] * np.conj(i[2])).imag + 0.95  # of the compensator
+
+    def passive(self, at_2, at_3):
+        """The matrix of admittances."""
+        Y = np.zeros((3, 3), complex)
+        y = 1 / self.LEAKAGE
+        Y[:2, :2] += np.array([[y / self.RATIO**2, -y / self.RATIO], [-y / self.RATIO, y]])
+        y = 1 / self.LINE
+        Y[1:, 1:] += np.array([[y + self.CHARGING, -y], [-y, y + self.CHARGING]])
+        return Y + np.diag([0, at_2, at_3])
+
+    def voltage(self, load, B):
+        """The voltage of bus 3 with a load at bus 2 and a susceptance at bus 3."""
+        Y = self.passive(load, self.loads[1] + 1j * B)
+        Y[0, 0] += 1 / self.SOURCE
+        return np.linalg.solve(Y, [self.emf / self.SOURCE, 0, 0])[2]
+
+
+def test_it_moves_as_psse_recorded_it():
+    """455 MW at bus 2 become 400 MW after 5 ms. Both lags of the measured voltage err least with 1 ms."""
+    trace = json.loads(TRACES.read_text("utf-8"))["traces"]["csvgn1"]
+    network = ThreeBuses()
+    start = network.voltage(network.loads[0], network.q / 1.015**2)
+    assert abs(start) == pytest.approx(1.015, abs=1e-5)
+    values = {"S_n": network.RATING, "Q_0": network.q * 100 / network.RATING, "v_0": 1.015}
+    values |= {"K": 20.0, "T1": 0.0, "T2": 1.0, "T3": 0.154833, "T4": 1.0, "T5": 0.005167}
+    values |= {"CBASE": 60.0, "theta_0": float(np.angle(start)), "bus_voltage.tau": 1e-3}
+    device, step, found = Evaluated(csvgn1_phasor(), values), 2e-4, []
+    x = np.array(device.x, dtype=float)
+
+    def rates(x, load):
+        susceptance = device.outputs([0.0, 0.0], x)["B"] * network.RATING / 100
+        v = network.voltage(load, susceptance)
+        return np.array([*device.rates([v.real, v.imag], x).values()]), abs(v)
+
+    for k in range(round(0.07 / step)):
+        load = network.loads[0] if k * step < 0.005 - step / 2 else network.after
+        slope, v = rates(x, load)
+        found.append(v)
+        x = x + step * rates(x + step / 2 * slope, load)[0]
+    recorded = np.array(trace["values"])[:-1]
+    every = round(trace["every"] / step)
+    deviation = np.array(found)[::every] - recorded
+    assert max(abs(deviation[:5])) < 1e-5
+    swing = (max(recorded[6:]) - min(recorded[6:])) / 2
+    assert np.sqrt(np.mean(deviation[6:] ** 2)) < 0.01 * swing
+    assert max(abs(deviation[6:])) < 0.025 * swing
+    assert abs(deviation[-1]) < 0.001 * swing
