@@ -31,6 +31,7 @@ from orchestrator.core.options import Option
 from orchestrator.core.question_kinds import by_kind
 from orchestrator.core.toml_files import Table, fault_of, read_toml
 from orchestrator.core.uncollected import uncollected
+from orchestrator.systems.coupling.no_trip_regions import NoTripCode
 
 if TYPE_CHECKING:
     from orchestrator.cases.events import event_tables
@@ -69,6 +70,13 @@ _TIMES = {"step_size": _STEP, "micro_step": _STEP} | dict.fromkeys(
 """Keys of times [s], with the remedy."""
 
 _SHARES = {"alpha": "it is a part of the unit's rating: 30 % is 0.3"}
+
+
+def with_protection(case: Case, code: NoTripCode | None) -> Case:
+    """Return the case whose converters trip as soon as a code lets them; as it is where the code is None."""
+    if code is None:
+        return case
+    return replace(case, table=case.table.model_copy(update={"protection": code}))
 
 
 def built_in_cases() -> tuple[str, ...]:

@@ -93,6 +93,7 @@ class Option(Spelling, Enum):
     POD = "pod"
     POINTS = "points"
     PORT = "port", ALONE
+    PROTECTION = "protection"
     RANGE = "range", "frequencies"
     RANK = "rank", "ranked"
     RATING = "rating"

@@ -32,17 +32,21 @@ def mill_case(
     records: Sequence[str] = (),
     events: Sequence[Mapping[str, object]] = (),
     units: str = "",
+    raw: str = RAW,
+    replace: Sequence[str] = (),
 ) -> Path:
     """Write the case, whose scenario ``tried`` has the events, and return its path.
 
-    ``records``: of dynamics data, without their ends; ``units``: lines for the table ``[units]``."""
-    (folder / "mill.raw").write_text(RAW)
+    ``records``: of dynamics data, without their ends; ``units``: lines for the table ``[units]``; ``replace``: units
+    whose machines converters replace."""
+    (folder / "mill.raw").write_text(raw)
     (folder / "mill.dyr").write_text(MACHINES + "".join(f"{text} /\n" for text in records))
     out = folder / "case.toml"
     files = (folder / "mill.raw", folder / "mill.dyr")
-    text = write_case(WantedCase(files, out, models="phasor")).text
+    text = write_case(WantedCase(files, out, models="phasor", replace=tuple(replace))).text
     text = text.replace('dyr = "mill.dyr"', f'{units}\ndyr = "mill.dyr"')
-    text = text.replace('"grid.line_*.p"', '"grid.line_*.p", "grid.sg2.p"')
+    name = "gfor2" if "2" in replace else "sg2"
+    text = text.replace('"grid.line_*.p"', f'"grid.line_*.p", "grid.{name}.p"')
     tables = "".join(
         "[[scenarios.tried.events]]\n" + "".join(f"{k} = {v!r}\n" for k, v in e.items())
         for e in events

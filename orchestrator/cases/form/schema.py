@@ -17,6 +17,7 @@ from orchestrator.core.foreign_files import one_line
 from orchestrator.core.toml_files import Table
 from orchestrator.core.units import to_unit
 from orchestrator.systems.coupling.events import FaultKind, ForcingShape
+from orchestrator.systems.coupling.no_trip_regions import NoTripCode
 from orchestrator.systems.coupling.schedule import TOLERANCES, ScheduleName
 
 Value = bool | float | str
@@ -660,6 +661,7 @@ class CaseTable(Table):
     directory: str | None = None
     meant: list[str] = []
     models: Literal["emt", "phasor"] | None = None
+    protection: NoTripCode | None = None
     emt: KindTable = KindTable()
     phasor: KindTable = KindTable()
     solver: SolverTable = SolverTable()

@@ -1,8 +1,10 @@
 """Relays of a scenario: which records of a DYR file have one here, and what it orders in a run."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
+from fmus.grid.network import Network
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.flow.power_flow import PowerFlow
 from orchestrator.cases.networks.data import bus_name
@@ -14,13 +16,22 @@ from orchestrator.cases.networks.psse.relay_records import (
     load_relays,
     unit_relays,
 )
+from orchestrator.cases.networks.step_ups import own_branches
 from orchestrator.core.errors import Problem, QuestionTopic
+from orchestrator.core.options import Option
 from orchestrator.systems.coupling.events import Event, LineSwitching, UnitSwitching
+from orchestrator.systems.coupling.no_trip_regions import NO_TRIP_REGIONS
 from orchestrator.systems.coupling.relays import RATED_FREQUENCY, Relay, Shedding
 
 _UNIT_KINDS = ("sg", "gfor")  # first parts of the names of a unit's generator and converter
 _RATED = "f_n"  # parameter with a device's rated frequency [Hz]
 _UNITS = {"voltage": "pu", "frequency": "Hz"}
+_DISTRIBUTED = (
+    "dera1_phasor"  # model of what a distribution network feeds: codes of plants are not its
+)
+_WIND = "WT"  # how the names of records begin that only wind turbines have
+_LONGEST_ASKED = 60.0  # delay [s] from which a relay trips after the end of most runs
+_OTHER_FREQUENCY = 1.0  # difference [Hz] from which a system has another rated frequency
 
 Place = tuple[str, int]
 """File and line of a record."""
@@ -105,7 +116,63 @@ def relays_of(draft: Draft, flow: PowerFlow | None) -> tuple[Relay, ...]:
             )
             found.append(relay)
             _ask(draft, relay, flow, stage.record)
-    return tuple(found)
+    ordered = (order for relay in found for order in relay.orders)
+    protected = {order.unit for order in ordered if isinstance(order, UnitSwitching)}
+    return (*found, *_by_code(draft, grid, f_n, protected, flow))
+
+
+def _by_code(
+    draft: Draft, grid: str, f_n: float, protected: Collection[str], flow: PowerFlow | None
+) -> Iterator[Relay]:
+    """Yield the relays of a code for the converters that have none by a record."""
+    code, network = draft.given.case.protection, draft.network
+    if code is None or network is None:
+        return
+    place, plans = draft.given.place("protection"), draft.system.components
+    known = plans[grid].description.variables
+    units = {port.name: port.bus for port in network.ports if port.name in plans}
+    high = _high_sides(network, units)
+    for name in (name for name in units if _is_plant(draft, name) and name not in protected):
+        region = NO_TRIP_REGIONS[code][_is_wind(draft, name)]
+        if abs(f_n - region.rated) > _OTHER_FREQUENCY:
+            text = f"{region.title} is for {region.rated:g} Hz, and the case has {f_n:g} Hz"
+            draft.note(place, f"{text}; leave it out (" + Option.PROTECTION + ")")
+            return
+        far = high.get(name, "")
+        watched = far if f"{far}.v_re" in known else units[name]
+        own = partial(
+            Relay,
+            record=region.title,
+            of=name,
+            component=grid,
+            bus=watched,
+            orders=(_unit_off(draft, grid, name),),
+            f_n=f_n,
+        )
+        for quantity, limits in region.limits.items():
+            for one in limits:
+                relay = own(quantity=quantity, limits=one)
+                if one.delay < _LONGEST_ASKED:
+                    _ask_at_rest(draft, relay, flow, place, "look at the operating point")
+                yield relay
+
+
+def _is_plant(draft: Draft, name: str) -> bool:
+    is_distributed = draft.tables[name].model == _DISTRIBUTED
+    return draft.system.components[name].kind == "converter" and not is_distributed
+
+
+def _high_sides(network: Network, units: Mapping[str, str]) -> dict[str, str]:
+    """Return the far bus of each unit's own transformer, where the code looks."""
+    own = own_branches(network, units)
+    ends = {line.name: {line.from_bus, line.to_bus} for line in network.lines if line.name in own}
+    return {own[name]: bus for name, both in ends.items() for bus in both - {units[own[name]]}}
+
+
+def _is_wind(draft: Draft, name: str) -> bool:
+    """Return whether a plant has a record of a wind turbine."""
+    records = draft.tables[name].records or ""
+    return any(record.upper().startswith(_WIND) for record in records.split())
 
 
 def _rated_frequency(draft: Draft) -> float:
@@ -173,6 +240,13 @@ def _shedding(draft: Draft, grid: str, stage: LoadRelay) -> Shedding | None:
 
 def _ask(draft: Draft, relay: Relay, flow: PowerFlow | None, record: DynamicRecord) -> None:
     """Ask about a relay that is beyond a limit at the operating point, and so trips in every run."""
+    remedy = f"correct its limit, or leave it out: dyr_leave_out = ['{record.name}'] in [units]"
+    _ask_at_rest(draft, relay, flow, record.place, remedy)
+
+
+def _ask_at_rest(
+    draft: Draft, relay: Relay, flow: PowerFlow | None, place: str, remedy: str
+) -> None:
     voltage = None if flow is None else flow.voltages.get(relay.bus)
     if relay.quantity == "frequency":
         rests = relay.f_n
@@ -186,9 +260,8 @@ def _ask(draft: Draft, relay: Relay, flow: PowerFlow | None, record: DynamicReco
     unit = _UNITS[relay.quantity]
     side = f"below {limits.low:g}" if rests < limits.low else f"above {limits.high:g}"
     text = (
-        f"{record.name} of {relay.of}: the {relay.quantity} of {relay.bus} rests at {rests:.4g} {unit}, {side} {unit}, "
-        f"so that it trips {limits.delay + limits.opening:g} s after the start of any run; correct its limit, or "
-        f"leave it out: dyr_leave_out = ['{record.name}'] in [units]"
+        f"{relay.record} of {relay.of}: the {relay.quantity} of {relay.bus} rests at {rests:.4g} {unit}, {side} "
+        f"{unit}, so that it trips {limits.delay + limits.opening:g} s after the start of any run; {remedy}"
     )
     topic = QuestionTopic("a relay beyond its limit at rest", relay.of)
-    draft.found.questions.append(Problem(record.place, text, topic=topic))
+    draft.found.questions.append(Problem(place, text, topic=topic))

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Concatenate, cast
 
 from orchestrator.cases.case import Case as CaseFile
+from orchestrator.cases.case import with_protection
 from orchestrator.cases.forcing import with_events
 from orchestrator.core.asked import names as names_given
 from orchestrator.core.asked import path as path_of
@@ -28,6 +29,7 @@ from orchestrator.studies.points.study import PointStudy, Study, StudyAtOnce, ch
 from orchestrator.studies.screening.command import STUDY as SCREENING
 from orchestrator.studies.siting.command import STUDY as SITING
 from orchestrator.studies.sweep.command import STUDY as SWEEP
+from orchestrator.systems.coupling.no_trip_regions import NoTripCode
 
 
 def _scenario(case: Any, request: ScenarioRequest) -> Scenario:
@@ -40,6 +42,7 @@ def _scenario(case: Any, request: ScenarioRequest) -> Scenario:
     file = with_events(
         case.file, names_given(request.force, "force"), names_given(request.fault, "fault")
     )
+    file = with_protection(file, cast("NoTripCode | None", request.protection))
     (chosen,) = chosen_of(file, [name] if name else [], request)
     question([chosen.prepared], above=1)
     return chosen

@@ -4,7 +4,7 @@ import argparse
 from dataclasses import replace
 from typing import Any
 
-from orchestrator.cases.case import Case, load_case
+from orchestrator.cases.case import Case, load_case, with_protection
 from orchestrator.cases.flow.sharing import SharingRule
 from orchestrator.cases.forcing import with_events
 from orchestrator.cases.form.parameter_files import ParameterFile, read_parameter_file
@@ -56,6 +56,7 @@ def case_of(options: argparse.Namespace) -> Case:
 def chosen(options: argparse.Namespace) -> list[Scenario]:
     events = [getattr(options, name, ()) for name in ("force", "fault")]
     file, stop = with_events(case_of(options), *events), getattr(options, "stop", None)
+    file = with_protection(file, getattr(options, "protection", None))
     file = replace(file, scans=getattr(options, "scans", False))
     asked: dict[str, Any] = {
         name: getattr(options, name, None) for name in ("schedule", "tolerance", "sharing")

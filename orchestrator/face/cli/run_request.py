@@ -28,6 +28,7 @@ _OF_THE_RUN: Mapping[str, Any] = {
     "sharing": None,
     "force": [],
     "fault": [],
+    "protection": None,
     "linear": False,
     "csv": True,
     "require_checkpoint": False,

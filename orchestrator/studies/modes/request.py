@@ -29,6 +29,7 @@ from orchestrator.studies.points.request import (
     ANYTHING,
     OfCase,
     of_black_box,
+    of_protection,
     of_scenarios,
     of_values,
 )
@@ -114,6 +115,7 @@ class ScenarioRequest(Preparing):
         'short circuits in the place of the case\'s events: ``"bus_9, 150 ms"``',
         option=None,
     )
+    protection: str | None = of_protection(option=None)
 
 
 @dataclass(frozen=True)

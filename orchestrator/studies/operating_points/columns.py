@@ -1,7 +1,6 @@
 """Meaning of the columns of a file of operating points, for one scenario."""
 
 import fnmatch
-from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -11,6 +10,7 @@ from orchestrator.cases.form.names import SERVICE, STATES, close_names
 from orchestrator.cases.form.schema import Value
 from orchestrator.cases.form.values import convert
 from orchestrator.cases.networks.element_names import ElementNames
+from orchestrator.cases.networks.step_ups import own_branches
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError, few
 from orchestrator.core.units import read_value
@@ -57,7 +57,7 @@ class Elements:
             shunts=tuple(x.name for x in network.shunts if f"{x.name}.connected" in switches),
             slack=units.get(wanted, wanted),
             balancing=prepared.power_flow.balancing if prepared.power_flow else (),
-            step_ups=_step_ups(prepared, units),
+            step_ups=own_branches(network, units),
             file=prepared.names,
         )
 
@@ -70,23 +70,6 @@ class Elements:
         name, _, quantity = column.rpartition(".")
         given = [u for u in self.balancing if name == self.units[u] or fnmatch.fnmatchcase(u, name)]
         return given if quantity in (ACTIVE, "P_0") else []
-
-
-def _step_ups(prepared: PreparedScenario, units: Mapping[str, str]) -> dict[str, str]:
-    """Branches without charging that alone lead to a bus with one unit and nothing else."""
-    network = prepared.network
-    if network is None:
-        return {}
-    ends = Counter(bus for line in network.lines for bus in (line.from_bus, line.to_bus))
-    ends.update([*(bus for x in network.transformers for bus in x.buses), *units.values()])
-    ends.update(2 * [*(x.bus for x in network.loads), *(x.bus for x in network.shunts)])
-    only = {bus: unit for unit, bus in units.items() if ends[bus] == 2}  # itself and one branch
-    return {
-        line.name: only[bus]
-        for line in network.lines
-        for bus in (line.from_bus, line.to_bus)
-        if bus in only and not line.B
-    }
 
 
 @dataclass(frozen=True)

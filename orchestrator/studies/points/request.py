@@ -16,8 +16,10 @@ from orchestrator.cases.form.given import (
 from orchestrator.cases.form.parameter_files import ParameterFile
 from orchestrator.cases.form.schema import Value
 from orchestrator.cases.settings.layers import OptionValues
-from orchestrator.core.asked import FLAG, FREQUENCIES, NAMES, FieldKind, asked, text_or_none
+from orchestrator.core.asked import FLAG, FREQUENCIES, NAMES, FieldKind, asked, seen, text_or_none
+from orchestrator.core.errors import InputError
 from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ
+from orchestrator.systems.coupling.no_trip_regions import NO_TRIP_REGIONS
 
 POINTS_FILE = FieldKind(
     "FILE",
@@ -63,6 +65,31 @@ def of_frequencies(python: str = "") -> Any:
         "frequencies [Hz] (0.1:2)",
         option="--range",
         python=python,
+    )
+
+
+def _known_code(given: Any, argument: str) -> Any:
+    if given is None or given in NO_TRIP_REGIONS:
+        return given
+    raise InputError(
+        f"{argument} = {seen(given)}; it must be one of {', '.join(NO_TRIP_REGIONS)}, or be left out"
+    )
+
+
+def read_no_trip_code(text: str) -> str:
+    """Read the name of a code with a region in which nobody may trip."""
+    if text not in NO_TRIP_REGIONS:
+        raise ValueError(f"{text!r} is no code; choose one of {', '.join(NO_TRIP_REGIONS)}")
+    return text
+
+
+def of_protection(option: str | None = "") -> Any:
+    """The code by which converters trip that have no relays of their own; None for no option."""
+    return asked(
+        FieldKind("CODE", read_no_trip_code, _known_code),
+        None,
+        "converters without relays of their own trip as soon as this code lets them: prc029",
+        option=option,
     )
 
 

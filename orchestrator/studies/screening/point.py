@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cases.case import Case
+from orchestrator.cases.case import Case, with_protection
 from orchestrator.cases.flow.sharing import SharingRule
 from orchestrator.cases.networks.branch_limits import Loading, Outlier, loadings, outliers
 from orchestrator.cases.scenario.prepare import PreparedScenario
@@ -38,6 +38,7 @@ from orchestrator.studies.screening.modes import (
 )
 from orchestrator.studies.screening.outage_runs import OutageRuns, first_bus
 from orchestrator.studies.screening.record import ItemRecord, StretchRecord, WantedRuns
+from orchestrator.systems.coupling.no_trip_regions import NoTripCode
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,7 @@ class StretchTask(Task):
     # whether taps and switched shunts move after an outage, whatever the case says
     move_controls: bool = False
     runs: WantedRuns | None = None  # of the outages as they happen
+    protection: NoTripCode | None = None  # by which converters trip in them
 
     def content(self) -> Any:
         """Where the points stand in their file does not count."""
@@ -60,7 +62,17 @@ class StretchTask(Task):
             [item.point - self.anchor.point, item.intact, item.values, item.out, item.lost]
             for item in chain
         ]
-        return plain([said, self.wanted, self.whole, self.sharing, self.move_controls, self.runs])
+        return plain(
+            [
+                said,
+                self.wanted,
+                self.whole,
+                self.sharing,
+                self.move_controls,
+                self.runs,
+                self.protection,
+            ]
+        )
 
     def failed(self, failure: Failure) -> StretchRecord:
         one = ItemRecord(Status.of(failure), failure.text, lasting=failure.lasting)
@@ -70,6 +82,7 @@ class StretchTask(Task):
 def _runs(task: StretchTask, wanted: WantedRuns, case: Case) -> OutageRuns:
     study = task.study
     case = with_moving_controls(case) if task.move_controls else case
+    case = with_protection(case, task.protection)
     return OutageRuns(
         case,
         study.scenario,

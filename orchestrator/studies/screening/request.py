@@ -25,6 +25,7 @@ from orchestrator.studies.points.request import (
     POINTS_FILE,
     OverCluster,
     of_frequencies,
+    of_protection,
     of_scenario,
     of_values,
 )
@@ -113,6 +114,7 @@ class ScreeningRequest(OverCluster):
         "in these runs a three-phase short circuit at the first bus of what is lost lasts so long before the outage, "
         "such as '100 ms'",
     )
+    protection: str | None = of_protection()
     frequencies: tuple[float, float] = of_frequencies(
         "modes from the first to the second are critical [Hz], where they are damped less than ``damping``"
     )

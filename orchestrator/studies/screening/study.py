@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import cast
 
-from orchestrator.cases.case import Case
+from orchestrator.cases.case import Case, with_protection
 from orchestrator.cases.flow.sharing import SharingRule
 from orchestrator.linear.spectra.mode_tracking import match
 from orchestrator.studies.operating_points.item import Item
@@ -19,6 +19,7 @@ from orchestrator.studies.screening.modes import CriticalRegion
 from orchestrator.studies.screening.point import StretchTask, compute_stretch
 from orchestrator.studies.screening.record import ItemRecord, StretchRecord
 from orchestrator.studies.screening.request import ScreeningRequest
+from orchestrator.systems.coupling.no_trip_regions import NoTripCode
 
 # operating points with outages that are computed one from the other before the next full search
 STRETCH = 48
@@ -58,8 +59,12 @@ def plan_screening(case: Case, request: ScreeningRequest) -> ScreeningPlan:
     region, sharing = request.region, cast("SharingRule | None", request.sharing)
     runs = request.wanted_runs
     case = with_moving_controls(case) if request.move_controls else case
+    code = cast("NoTripCode | None", request.protection)
+    case = with_protection(case, code)
     read = read_operating_points(case, request, request.points, request.outages, request.scenario)
-    study = StudyCase.of(read.prepared, read.layers, request.step_size)
+    # relays change no FMU and no value, but what the runs show
+    besides = {} if runs is None else {"relays": repr(read.prepared.relays)}
+    study = StudyCase.of(read.prepared, read.layers, request.step_size, **besides)
     tasks = []
     for first in range(0, len(read.items), STRETCH):
         part = read.items[first : first + STRETCH]
@@ -75,6 +80,7 @@ def plan_screening(case: Case, request: ScreeningRequest) -> ScreeningPlan:
                 sharing=sharing,
                 move_controls=request.move_controls,
                 runs=runs,
+                protection=code,
             )
         )
     return ScreeningPlan(**vars(read), wanted=region, tasks=tuple(tasks))

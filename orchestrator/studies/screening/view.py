@@ -14,6 +14,7 @@ from rich.markup import escape as escape_markup
 from orchestrator.cases.settings.layers import joined_values
 from orchestrator.core.errors import Problem, few, number_of
 from orchestrator.core.late import pd
+from orchestrator.core.options import Option
 from orchestrator.core.safe_files import made_folder, write_text
 from orchestrator.core.truth import NoTruth
 from orchestrator.output.report.explorer_cells import CELLS, Cell, CellLine, Cells
@@ -375,7 +376,8 @@ def _of_relays(summary: Summary) -> str:
     """Tell that the runs of the outages can show no trips; "" where there are relays, or no runs."""
     if not summary.runs or summary.result.plan.prepared.relays:
         return ""
-    return "no relay is in the case, so that nothing trips in the runs of the outages"
+    told = "no relay is in the case, so that nothing trips in the runs of the outages"
+    return f"{told}; " + Option.PROTECTION + " prc029 lets converters trip by NERC's PRC-029"
 
 
 def remarks(summary: Summary) -> list[str]:

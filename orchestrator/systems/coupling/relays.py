@@ -5,7 +5,7 @@ its delay it orders its events, which happen when the breaker has opened; then n
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import atan2, exp, hypot, inf, pi
+from math import exp, inf, pi
 from typing import Any, Literal
 
 import numpy as np
@@ -49,12 +49,14 @@ class Shedding:
 class RelayLimits:
     """Limits of a voltage [pu] or a frequency [Hz], −∞ and ∞ where there is none, and times [s].
 
-    ``delay``: time beyond a limit after which the relay trips; ``opening``: time of the breaker after that."""
+    ``delay``: time beyond a limit after which the relay trips; ``opening``: time of the breaker after that.
+    ``window``: the last seconds of which all that was beyond counts together; 0 where coming back forgets it."""
 
     low: float
     high: float
     delay: float
     opening: float
+    window: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +110,18 @@ class Relays:
         self._state = np.full((len(self.relays), _COLUMNS), inf)
         self._state[:, [_SEEN, _ANGLE, _SLIP, _SCALE]] = 0.0
         self._looked: float | None = None  # time of the last look [s]
-        self._batches: list[RealBatch] = []
+        limits = [relay.limits for relay in self.relays]
+        self._low, self._high, self._delay = np.array(
+            [(x.low, x.high, x.delay) for x in limits]
+        ).T.reshape(3, -1)
+        self._windows = np.array([x.window for x in limits])
+        self._follows = np.array([relay.quantity == "frequency" for relay in self.relays])
+        self._rated = np.array([relay.f_n for relay in self.relays])
+        # begin and end [s] of each time beyond a limit, of relays with a window
+        self._spans: dict[int, list[list[float]]] = {
+            int(k): [] for k in np.flatnonzero(self._windows)
+        }
+        self._batches: list[tuple[RealBatch, Any]] = []
 
     @property
     def trips(self) -> list[Trip]:
@@ -124,35 +137,61 @@ class Relays:
         return found
 
     def begin(self, run: ObservedRun, stop_index: int) -> None:
-        """Find the voltages of the buses."""
-        self._batches = [
-            RealBatch(run.components[x.component], [f"{x.bus}.v_re", f"{x.bus}.v_im"])
-            for x in self.relays
-        ]
+        """Find the voltages of the buses, each of which is read once for all of its relays."""
+        self._batches = []
+        for name in dict.fromkeys(relay.component for relay in self.relays):
+            of = [k for k, relay in enumerate(self.relays) if relay.component == name]
+            buses = list(dict.fromkeys(self.relays[k].bus for k in of))
+            wanted = [f"{bus}.{part}" for bus in buses for part in ("v_re", "v_im")]
+            rows = np.array([(k, buses.index(self.relays[k].bus)) for k in of]).T
+            self._batches.append((RealBatch(run.components[name], wanted), rows))
 
     def observe(self, run: ObservedRun) -> None:
         """Look at the buses; a second look at one communication point sees what an event changed there."""
         elapsed = 0.0 if self._looked is None else run.time - self._looked
-        for relay, batch, own in zip(self.relays, self._batches, self._state, strict=True):
-            re, im = batch.read().tolist()
-            value = hypot(re, im)
-            if relay.quantity == "frequency":
-                _follow_angle(own, atan2(im, re), elapsed if value > LEAST_VOLTAGE else 0.0)
-                value = relay.f_n + float(own[_SLIP])
-            if own[_DECIDED] == inf:
-                self._judge(relay.limits, own, value, run.time)
+        voltage = np.zeros((2, len(self.relays)))
+        for batch, (relays, buses) in self._batches:
+            voltage[:, relays] = batch.read().reshape(-1, 2).T[:, buses]
+        value = np.hypot(*voltage)
+        angle = np.arctan2(voltage[1], voltage[0])
+        slip = _follow_angles(self._state, angle, elapsed, value > LEAST_VOLTAGE)
+        self._judge(np.where(self._follows, self._rated + slip, value), run.time)
         self._looked = run.time
 
     def end(self, run: ObservedRun) -> None:
         """See `Observer.end`."""
 
-    def _judge(self, limits: RelayLimits, own: Numbers, value: float, time: float) -> None:
-        if limits.low <= value <= limits.high:
-            own[_PICKED_UP] = inf
-            return
-        own[_PICKED_UP] = min(own[_PICKED_UP], time)
-        if time - own[_PICKED_UP] >= limits.delay - self._least:
-            own[_DECIDED], own[_SEEN] = time, value
+    def _judge(self, seen: Numbers, time: float) -> None:
+        """Let relays pick up, forget and trip by what they see now."""
+        waits = self._state[:, _DECIDED] == inf
+        beyond = ((seen < self._low) | (seen > self._high)) & waits
+        forgets = self._windows == 0
+        since = self._state[:, _PICKED_UP]
+        since[waits & forgets & ~beyond] = inf
+        since[beyond & forgets] = np.minimum(since[beyond & forgets], time)
+        lasted = np.where(beyond & forgets, time - since, -inf)
+        for k in np.flatnonzero(~forgets & waits).tolist():
+            since[k], lasted[k] = self._within_window(k, time, is_beyond=bool(beyond[k]))
+        trips = beyond & (lasted >= self._delay - self._least)
+        self._state[trips, _DECIDED] = time
+        self._state[trips, _SEEN] = seen[trips]
+
+    def _within_window(self, k: int, time: float, *, is_beyond: bool) -> tuple[float, float]:
+        """Return since when a relay has been beyond its limits within its window, and for how long in all [s]."""
+        spans, first = self._spans[k], time - self._windows[k]
+        while spans and spans[0][1] <= first:
+            del spans[0]
+        is_open = bool(spans) and spans[-1][1] == self._looked
+        if is_beyond and is_open:
+            spans[-1][1] = time
+        elif is_beyond:
+            spans.append([time, time])
+        elif is_open:
+            spans[-1][1] = np.nextafter(spans[-1][1], -inf)  # closed: the next one begins anew
+        if not spans:
+            return inf, -inf
+        lasted = sum(end - max(begin, first) for begin, end in spans)
+        return max(spans[0][0], first), lasted
 
     def ordered(self, run: ObservedRun) -> list[Event]:
         """Return the events of the relays whose breakers open now."""
@@ -186,21 +225,33 @@ class Relays:
 
     def position(self) -> dict[str, Any]:
         """See `Resumable.position`."""
-        return {"relays": self._state.copy(), "looked": self._looked or 0.0}
+        spans = [(k, *span) for k, of in self._spans.items() for span in of]
+        return {
+            "relays": self._state.copy(),
+            "looked": self._looked or 0.0,
+            "spans": np.array(spans).reshape(-1, 3),
+        }
 
     def resume(self, position: Mapping[str, Any]) -> None:
         """See `Resumable.resume`."""
         self._state[:] = position["relays"]
         self._looked = float(position["looked"])
+        for k, begin, end in position["spans"].tolist():
+            self._spans[int(k)].append([begin, end])
 
 
-def _follow_angle(own: Numbers, angle: float, elapsed: float) -> None:
-    """Move the filtered frequency by what the angle moved in a time [s]; the jump of an event takes none."""
-    turned = (angle - own[_ANGLE] + pi) % (2 * pi) - pi
-    own[_ANGLE] = angle
+def _follow_angles(state: Any, angle: Numbers, elapsed: float, tells: Numbers) -> Numbers:
+    """Move the filtered frequencies by what the angles moved in a time [s], and return them beside the rated one [Hz].
+
+    The jump of an event takes no time, and where ``tells`` is not true the angle says nothing."""
+    turned = (angle - state[:, _ANGLE] + pi) % (2 * pi) - pi
+    state[:, _ANGLE] = angle
+    slip = state[:, _SLIP]
     if elapsed > 0:
         kept = exp(-elapsed / FREQUENCY_LAG)
-        own[_SLIP] = kept * own[_SLIP] + (1 - kept) * turned / (2 * pi * elapsed)
+        moved = kept * slip + (1 - kept) * turned / (2 * pi * elapsed)
+        slip[:] = np.where(tells, moved, slip)
+    return np.asarray(slip)
 
 
 def _scale_after(order: Shedding, before: Sequence[Trip], run: ObservedRun) -> float:

@@ -92,6 +92,20 @@ def test_kept_points_bring_their_runs_along(screened):
     assert (again.result.computed, first.result.computed) == (0, 2)
     assert run_of(again, "line_1_2") == run_of(first, "line_1_2")
     assert screened([SPEED], ["line_1_2"], trips="1 s").result.computed == 2
+    later = SPEED.replace("0.05", "0.25")  # a relay changes no FMU and no value
+    (trip,) = run_of(screened([later], ["line_1_2"]), "line_1_2").trips
+    assert trip.time == pytest.approx(run_of(first, "line_1_2").trips[0].time + 0.2)
+
+
+def test_a_code_lets_converters_trip_in_runs_of_outages(tmp_path):
+    case = gfor.load(mill_case(tmp_path, replace=["2"]))
+    wanted = {"outages": ["load_2"], "scenario": "base", "trips": "1 s", "cleared_after": "500 ms"}
+    wanted["sharing"] = "slack"
+    assert run_of(case.screen(**wanted), "load_2").trips == ()
+    (trip, *_) = run_of(case.screen(**wanted, protection="prc029"), "load_2").trips
+    assert (trip.of, trip.record) == ("gfor2", "PRC-029")
+    with pytest.raises(InputError, match="protection = 'prc30'; it must be one of prc029"):
+        case.screen(**wanted, protection="prc30")
 
 
 def test_a_run_that_cannot_be_is_an_item_that_is_not_judged(screened, monkeypatch):

@@ -13,6 +13,7 @@ from orchestrator.studies.certification.codes.programme import (
     weakening,
 )
 from orchestrator.studies.certification.codes.row import CodeRow, DeclaredCode, GridCode, Judge
+from orchestrator.systems.coupling.no_trip_regions import PRC029_HIGH, PRC029_LOW
 
 RATIOS = (10.0, 3.0, 2.0, 1.5, 1.25)
 """Short-circuit ratios, down from 20: MISO BPM-015 r32 appendix H, AEMO's test framework of January 2024."""
@@ -33,11 +34,15 @@ AFTER = 5.0  # how long a ride-through is looked at after the last step [s]
 SJV_DIP = ((0.0, 0.0), (0.2, 0.85), (0.75, 0.90), (1.5, 1.0))
 """Fingrid: voltage over the time after the dip [s, pu], type D, as steps."""
 
-PRC_DIPS = ((0.2, 0.32), (0.45, 1.2), (0.65, 3.0), (0.85, 6.0))
+_WITHIN = 0.05  # distance of a voltage that is tried from the end of its band [pu]
+PRC_DIPS = tuple((round(below - _WITHIN, 2), lasts) for below, lasts in PRC029_LOW)
 """Voltage [pu], each within its band (below 0.25, 0.50, 0.70, 0.90), and for how long it has to be ridden through [s];
 resources other than wind."""
 
-PRC_SWELL = (1.15, 1.0)  # voltage within the band above 1.10 [pu], and its time [s]
+PRC_SWELL = (
+    1.15,
+    dict(PRC029_HIGH)[1.1],
+)  # voltage within the band above 1.10 [pu], and its time [s]
 NOGRR_ZERO = (0.0, 0.15)  # no voltage [pu], and its time [s]
 NOGRR_LEVELS = (0.2, 0.45, 0.65, 0.85)  # voltages of the dips between 0 and 0.9 [pu]
 # highest voltage of each band [pu], and its time [s]

@@ -6,6 +6,7 @@ import pytest
 import xarray as xr
 
 from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
+from orchestrator.cases.case import load_case, with_protection
 from orchestrator.core.errors import CaseError
 from tests.cases.networks.psse.test_dyr_following import REGCA1, dyr, prepared, record
 
@@ -235,6 +236,18 @@ def test_other_records_are_one_plant(records, prepared):
         assert (given["electrical.SOCini"], given["electrical.T"]) == (0.4, 3600.0)
     if "WTTQA1" in records:
         assert (given["torque.P3"], given["shaft.Freq1"]) == (0.6, 1.6)
+
+
+@pytest.mark.parametrize(
+    ("records", "shortest"),
+    [("REGCB1 REECC1", 0.32), ("REGCA1 REECA1 WTDTA1 WTARA1 WTPTA1 WTTQA1", 0.16)],
+)
+def test_a_code_gives_a_wind_plant_the_times_of_wind(records, shortest, prepared, tmp_path):
+    """PRC-029 has a table of its own for wind: below 0.25 pu half of the time."""
+    prepared(with_records(*MADE[records]), "")
+    (ready,) = with_protection(load_case(tmp_path / "case.toml"), "prc029").prepare()
+    assert {relay.of for relay in ready.relays} == {"gfor3"}
+    assert min(x.limits.delay for x in ready.relays if x.limits.low == 0.25) == shortest
 
 
 @pytest.mark.parametrize("records", [name for name in MADE if "elsewhere" not in name])

@@ -1,0 +1,93 @@
+"""Converters that trip as soon as NERC's PRC-029 lets them: its times, where it looks, and who is left alone."""
+
+import pytest
+
+from orchestrator.cases.case import load_case, with_protection
+from orchestrator.core.errors import CaseError
+from orchestrator.studies.runs.run import run_scenario
+from orchestrator.systems.coupling.relays import Relays
+from tests.support.mill import RAW, mill_case
+
+OWN_RELAY = "1 'VTGTPAT' 2 2 '1' 0.8 9 0.05 0"
+
+
+def fault(time, duration, X=0.0):
+    return {"type": "bus_fault", "bus": "bus_2", "time": time, "duration": duration, "X": X}
+
+
+@pytest.fixture
+def prepared(tmp_path):
+    """Events, a stop [s] and records → the case whose plant is a converter, protected by the code."""
+
+    def made(events=(), stop=2.0, records=(), raw=RAW):
+        case = load_case(mill_case(tmp_path, records, events, raw=raw, replace=["2"]))
+        scenario = "tried" if events else "base"
+        (ready,) = with_protection(case, "prc029").prepare([scenario], None, None, stop)
+        return ready
+
+    return made
+
+
+@pytest.mark.parametrize(
+    ("faults", "stop", "time"),
+    [
+        ([fault(1.0, 0.3)], 2.0, None),
+        ([fault(1.0, 0.4)], 2.0, 1.32),
+        ([fault(1.0, 0.2), fault(2.0, 0.2)], 3.0, 2.12),  # within 10 s they count together
+    ],
+)
+def test_without_voltage_it_has_to_stay_for_so_long_in_all(faults, stop, time, prepared):
+    """Below 0.25 pu for 0.32 s; the frequency of a bus without voltage stays what it was."""
+    found = [
+        (trip.relay.of, trip.relay.record, trip.time)
+        for trip in run_scenario(prepared(faults, stop)).trips
+    ]
+    assert found == ([] if time is None else [("gfor2", "PRC-029", pytest.approx(time, abs=1e-9))])
+
+
+def test_what_lies_further_back_than_the_window_counts_no_more(prepared):
+    ready = prepared([fault(0.5, 0.2)])
+    watch = Relays(ready.relays, ready.step_size)
+    (k,) = (k for k, x in enumerate(ready.relays) if x.limits.low == 0.25)
+    for time in (0.5, 0.7):
+        watch._within_window(k, time, is_beyond=True)
+        watch._looked = time
+    watch._within_window(k, 0.7, is_beyond=False)
+    assert watch._within_window(k, 10.6, is_beyond=True) == pytest.approx((0.6, 0.1))
+    watch._looked = 10.6
+    assert watch._within_window(k, 10.8, is_beyond=True) == pytest.approx((10.6, 0.2))
+
+
+def test_a_run_that_is_taken_up_knows_how_long_it_was_beyond(prepared):
+    """The first of two short circuits is before the interruption, and its 0.2 s count."""
+    ready = prepared([fault(1.0, 0.2)])
+    watch = Relays(ready.relays, ready.step_size)
+    (k,) = (k for k, x in enumerate(ready.relays) if x.limits.low == 0.25)
+    for time in (1.0, 1.2):
+        watch._within_window(k, time, is_beyond=True)
+        watch._looked = time
+    watch._within_window(k, 1.2, is_beyond=False)
+    again = Relays(ready.relays, ready.step_size)
+    again.resume(watch.position())
+    again._within_window(k, 2.0, is_beyond=True)
+    again._looked = 2.0
+    assert again._within_window(k, 2.1, is_beyond=True)[1] == pytest.approx(0.3)
+
+
+def test_a_unit_with_a_relay_of_its_own_keeps_that_alone(prepared):
+    assert {x.record for x in prepared(records=[OWN_RELAY]).relays} == {"VTGTPAT"}
+    assert {(x.of, x.record) for x in prepared().relays} == {("gfor2", "PRC-029")}
+
+
+def test_the_code_looks_at_the_high_side_of_a_plants_own_transformer(prepared):
+    """The load is at bus 1, so that the branch leads to the plant alone."""
+    assert {relay.bus for relay in prepared().relays} == {"bus_2"}
+    apart = RAW.replace("2, '1', 1, 1, 1, 60.0", "1, '1', 1, 1, 1, 60.0")
+    apart = apart.replace("2, '2', 1, 1, 1, 20.0", "1, '2', 1, 1, 1, 20.0")
+    assert {relay.bus for relay in prepared(raw=apart).relays} == {"bus_1"}
+
+
+def test_at_another_rated_frequency_the_code_is_refused():
+    case = load_case("four_vsc_rms")
+    with pytest.raises(CaseError, match=r"PRC-029 is for 60 Hz, and the case has 50 Hz; leave it"):
+        with_protection(case, "prc029").prepare()
