@@ -13,6 +13,7 @@ from orchestrator.cases.networks.psse.missing_models import (
     is_resting,
     kind_of,
     names_load,
+    owner_of,
 )
 from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
 
@@ -89,7 +90,7 @@ def _use_of(
         told = f"an event of ANDES, of {record.machine}; [scenarios] has events"
         return UseOfRecord.NOT_USED, told, False
     if record.line_of_dc:
-        told = f"a model of the DC line {record.line_of_dc!r}, which is of no machine"
+        told = f"a model of the {owner_of(record)} {record.line_of_dc!r}, which is of no machine"
         return UseOfRecord.NOT_USED, told, True
     kind = kind_of(record.name)
     if kind in OF_MACHINES:

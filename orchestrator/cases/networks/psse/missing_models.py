@@ -101,6 +101,29 @@ def kind_of(name: str) -> str:
     return _kinds().get(name, UNKNOWN)
 
 
+_OF_FACTS_DEVICES = ("CSTCNT", "SVSMO3T2", "SVSMO3T3")
+"""Models whose records begin with the name of a FACTS device, where those of DC lines have theirs."""
+
+
+def owner_of(record: DynamicRecord) -> str:
+    """Return what a record without a machine is of: those that begin with a name are of DC lines or FACTS devices."""
+    if not record.line_of_dc:
+        return "bus"
+    return "FACTS device" if record.name in _OF_FACTS_DEVICES else "DC line"
+
+
+@cache
+def _reasons() -> Mapping[str, str]:
+    path = Path(__file__).with_name("devices_without_model.toml")
+    listed = tomllib.loads(path.read_text(encoding="utf-8"))
+    return {name: reason for reason, names in listed.items() for name in str(names).split()}
+
+
+def reason_of_device(name: str) -> str:
+    """Return why a compensator's or a DC line's record has no model; empty if that is not known."""
+    return _reasons().get(name, "")
+
+
 _RELAY = "relay"
 _RELAYS_OF_LOADS = ("LVSH", "LDSH", "LVS3", "LDS3", "LDST", "LVDT", "UVUF")
 """How the names of relays begin that shed load."""

@@ -12,6 +12,8 @@ from orchestrator.cases.networks.psse.missing_models import (
     OF_MACHINES,
     RESTS,
     kind_of,
+    owner_of,
+    reason_of_device,
 )
 from orchestrator.cases.networks.psse.motor_loads import MOTOR_NAMES
 from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
@@ -63,12 +65,14 @@ def unused_models(
         )
         if kind in _MATTER and not is_said:
             remedy = f"; to take it for all loads, write {law} in [network]" if law else ""
+            reason = reason_of_device(name)
+            remedy = f" ({reason})" if reason else remedy
             if name in MOTOR_NAMES or name in COMPOSITE_NAMES:
                 remedy = _NO_LOAD if among_phasors else _PHASORS
             places = few(
                 dict.fromkeys(record.line_of_dc or str(record.bus) for record in own), _MOST_BUSES
             )
-            where = "DC line" if own[0].line_of_dc else "bus"
+            where = owner_of(own[0])
             text = f"{name} ({where} {places}) is of no machine and not used: {_MATTER[kind]}"
             remark = Remark(text + remedy, f"{name} of no machine")
             for record in own:

@@ -1,17 +1,19 @@
 """Every record of a DYR file is used, listed, or in the table of what gfor does not have."""
 
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from orchestrator.cases.networks.psse import missing_models
 from orchestrator.cases.networks.psse.dyr import machine_models
 from orchestrator.cases.networks.psse.dyr_records import read_dyr
 from orchestrator.cases.networks.psse.dyr_units import without_idle_controls
 from orchestrator.cases.networks.psse.dyr_uses import record_uses
 from orchestrator.cases.networks.psse.known_records import known_records
 from orchestrator.cases.networks.psse.machine_model import COMPENSATION
-from orchestrator.cases.networks.psse.missing_models import kind_of
+from orchestrator.cases.networks.psse.missing_models import kind_of, reason_of_device
 from orchestrator.cases.networks.psse.raw_network import Machine
 from orchestrator.cases.networks.psse.unused_models import unused_models
 from orchestrator.cases.networks.record_use import UseOfRecord, in_one_line
@@ -95,7 +97,19 @@ def test_models_of_dc_lines_are_passed_over_and_asked_about(tmp_path):
     ]
     first, second = (str(question) for question in unused_models(records, uses))
     assert "line 4: CDC4T (DC line NORTH-SOUTH) is of no machine and not used: what it" in first
+    assert "constant (no model of a DC line is here)" in " ".join(first.split())
     assert "line 6: VSCHVDCP0 (DC line Link 2)" in second
+
+
+def test_a_model_of_a_facts_device_says_whose_it_is_and_why_it_is_not_used(tmp_path):
+    records = read(
+        tmp_path, CLASSICAL + "'F 1' 'CSTCNT' 0 0.0 0.1 0.0 25 0.03 9 -9 1 1 0.2 1.2 0.1 0.5 /\n"
+    )
+    uses = record_uses(records, {(bus, "1") for bus in (1, 2, 3)}, ())
+    assert uses[-1].why == "a model of the FACTS device 'F 1', which is of no machine"
+    (question,) = (str(question) for question in unused_models(records, uses))
+    assert "CSTCNT (FACTS device F 1) is of no machine and not used" in question
+    assert "no public source gives the order of its fields" in " ".join(question.split())
 
 
 @pytest.mark.parametrize("bus", ["A1", "'A1'"])
@@ -167,6 +181,19 @@ def test_the_page_has_the_table():
         f"| {r.name} | {r.kind} | `{r.part}` | {r.held_against} | {r.approximated} |"
         for r in known_records()
     ]
+
+
+def test_a_device_without_a_model_has_a_reason_which_the_page_lists():
+    page = (Path(__file__).parents[4] / ".docs/reference/dynamics-records.md").read_text("utf-8")
+    lines = [line for line in page.splitlines() if line.startswith("- ")]
+    known = {record.name for record in known_records()}
+    table = Path(missing_models.__file__).with_name("model_names.toml").read_text("utf-8")
+    without = {*tomllib.loads(table)["device"].split()} - known
+    assert without == {name for line in lines for name in line[2:].split(":")[0].split()}
+    for line in lines:
+        names, _, reason = line[2:].partition(": ")
+        assert {reason_of_device(name) for name in names.split()} == {reason}
+    assert reason_of_device("SVSMO1T2") == ""
 
 
 def test_each_record_says_what_it_was_held_against():
