@@ -189,10 +189,16 @@ def errors_in(
         max_at=recording.begin + float(times[worst]),
         mean_error=float(inside.mean()),
         mean_abs_error=float(np.abs(inside).mean()),
-        max_of_noise=noise.scatter * float(np.sqrt(2 * np.log(2 * max(independent, 1.0)))),
+        max_of_noise=largest_of_noise(noise, len(inside)),
         mean_of_noise=2 * noise.scatter / float(np.sqrt(independent)),
         mean_abs_of_noise=noise.scatter * float(np.sqrt(2 / np.pi)),
     )
+
+
+def largest_of_noise(noise: SignalNoise, count: int) -> float:
+    """The largest magnitude that noise alone is expected to have in so many samples [pu]."""
+    independent = max(1.0, count / noise.together)
+    return noise.scatter * float(np.sqrt(2 * np.log(2 * independent)))
 
 
 def delay_between(

@@ -26,6 +26,7 @@ from orchestrator.studies.validation.words import (
     open_sentence,
     sentence,
     untold_words,
+    yardstick_sentence,
 )
 
 _POWERS = ("p", "q")
@@ -57,6 +58,7 @@ def validation_page(result: ValidationResult) -> str:
     verdict = "no verdict: no limits were given" if result.verdict is None else str(result.verdict)
     said = error_sentence(result.comparisons)
     says = [f"Limits: {verdict}.", f"{device.name}: {said}."]
+    says.append(yardstick_sentence(result.comparisons))
     left = open_sentence(result.criteria, result.devices)
     says += [f"{left}."] if left else []
     places = [one for one in result.apart if one.more_than_from_record]

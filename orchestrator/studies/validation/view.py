@@ -24,6 +24,7 @@ from orchestrator.studies.validation.fit import Fit
 from orchestrator.studies.validation.limits import Criterion, LimitVerdict
 from orchestrator.studies.validation.questions import Question
 from orchestrator.studies.validation.study import ValidationResult
+from orchestrator.studies.validation.swing import swings_of
 from orchestrator.studies.validation.tables import (
     beside_table,
     confirmation_table,
@@ -37,8 +38,10 @@ from orchestrator.studies.validation.words import (
     fit_sentence,
     open_sentence,
     sentence,
+    swing_cell,
     untold_words,
     value_text,
+    yardstick_sentence,
 )
 
 _GOOD = {LimitVerdict.MET: True, LimitVerdict.NOT_MET: False, LimitVerdict.OPEN: None}
@@ -204,6 +207,7 @@ def _event_json(one: EventComparison) -> dict[str, Any]:
         "windows_found": not event.windows.chosen,
         "windows": [_window_json(one, name) for name in one.errors],
         "signals": signals,
+        "swings": {name: swing.as_json() for name, swing in swings_of(one).items()},
         "questions": [_question_json(question) for question in one.questions],
     }
 
@@ -258,7 +262,11 @@ def _answer(found: Validation) -> str:
     result = found.result
     says = error_sentence(result.comparisons)
     if result.verdict is None:
-        return escape(f"{result.request.device.name}: {says}; without --limits there is no verdict")
+        beside = yardstick_sentence(result.comparisons)
+        said = (
+            f"{result.request.device.name}: {says}. {beside} Without --limits there is no verdict."
+        )
+        return escape(said)
     left = open_sentence(result.criteria, result.devices)
     says += f"; {left}" if left else ""
     word = {"met": "MET", "not met": "NOT MET", "open": "OPEN"}[str(result.verdict)]
@@ -272,6 +280,7 @@ def _events_table(result: ValidationResult) -> PlainTable:
         "P, Q before [pu]",
         "Worst error [pu]",
         "at [s]",
+        "P, Q off, of the swing",
         "Rings",
         "Model rings",
     )
@@ -288,6 +297,7 @@ def _events_table(result: ValidationResult) -> PlainTable:
                 f"{power.real:.3f}, {power.imag:.3f}",
                 f"{figures.max_error:.4f} of {signal.upper()}",
                 f"{figures.max_at:.4g}",
+                swing_cell(one),
                 *(
                     f"{m.frequency_hz:.3g} Hz, {m.damping_percent:.3g} %" if m else "–"
                     for m in modes

@@ -13,6 +13,7 @@ from orchestrator.studies.validation.event import EventComparison, JumpDoubt
 from orchestrator.studies.validation.fit import Fit, FittedParameter, Untold
 from orchestrator.studies.validation.limits import Criterion, LimitVerdict, OpenCause
 from orchestrator.studies.validation.questions import Question, QuestionKind
+from orchestrator.studies.validation.swing import Swing, swings_of
 
 Figures = Mapping[str, Any]
 
@@ -354,17 +355,58 @@ def untold_words(one: FittedParameter) -> str:
             return "no: its interval is as large as itself"
 
 
+_UNITS = {"p": "MW", "q": "Mvar"}
+
+
+def _worst(comparisons: Sequence[EventComparison]) -> EventComparison:
+    """The event with the largest error of P or Q."""
+    return max(comparisons, key=lambda each: each.largest_error[2].max_error)
+
+
 def error_sentence(comparisons: Sequence[EventComparison]) -> str:
     """Say how large the largest error of P or Q is, and where."""
-    one = max(comparisons, key=lambda each: each.largest_error[2].max_error)
+    one = _worst(comparisons)
     window, signal, figures = one.largest_error
+    size = (
+        f"{figures.max_error:.3g} pu ({figures.max_error * one.device.rating:.3g} {_UNITS[signal]})"
+    )
     text = (
-        f"the largest error is {figures.max_error:.3g} pu, of {signal.upper()} {window} the event of "
+        f"the largest error is {size}, of {signal.upper()} {window} the event of "
         f"{one.event.recording.label}, at {figures.max_at:.4g} s"
     )
     if one.doubt is JumpDoubt.SAMPLES and figures.max_of_noise >= figures.max_error:
         text += ", which is no more than the moment of the voltage's jump between two samples makes"
     return text
+
+
+def yardstick_sentence(comparisons: Sequence[EventComparison]) -> str:
+    """Lay the errors of the worst event beside its own swing and beside what the recording leaves open."""
+    one = _worst(comparisons)
+    swings = swings_of(one)
+    seen = [f"{name.upper()} by {_off(swing)}" for name, swing in swings.items() if swing.seen]
+    still = [name.upper() for name, swing in swings.items() if not swing.seen]
+    said = []
+    if seen:
+        said.append(f"From the event on the model misses {', and '.join(seen)}.")
+    if still:
+        said.append(f"The event moves {' and '.join(still)} by no more than instruments do.")
+    figures = one.largest_error[2]
+    said.append(
+        f"Of the largest error, up to {figures.max_of_noise:.2g} pu may be the recording's noise and samples, and none "
+        "of the model's."
+    )
+    return " ".join(said)
+
+
+def _off(swing: Swing) -> str:
+    part, rms_part = swing.part or 0.0, swing.rms_part or 0.0
+    return f"up to {part:.0%} of the {swing.largest:.3g} pu that the plant swings ({rms_part:.0%} in the mean)"
+
+
+def swing_cell(comparison: EventComparison) -> str:
+    """The rms errors of P and Q as parts of the plant's own swing; a dash where it has none."""
+    parts = [one.rms_part for one in swings_of(comparison).values()]
+    return ", ".join("–" if part is None else f"{part:.0%}" for part in parts)
 
 
 _WHY_OPEN = {
