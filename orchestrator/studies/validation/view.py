@@ -196,6 +196,7 @@ def _event_json(one: EventComparison) -> dict[str, Any]:
     }
     channels = {role: channel.as_text() for role, channel in recording.channels.items()}
     signals = {name: figures.as_json() for name, figures in one.signals.items()}
+    swings = {name: swing.as_json() for name, swing in swings_of(one).items()}
     return {
         "recording": recording.label,
         "sha256": recording.sha256,
@@ -207,7 +208,7 @@ def _event_json(one: EventComparison) -> dict[str, Any]:
         "windows_found": not event.windows.chosen,
         "windows": [_window_json(one, name) for name in one.errors],
         "signals": signals,
-        "swings": {name: swing.as_json() for name, swing in swings_of(one).items()},
+        "swings": swings,
         "questions": [_question_json(question) for question in one.questions],
     }
 
