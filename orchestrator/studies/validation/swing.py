@@ -16,7 +16,7 @@ _ABOVE_NOISE = 2.0  # times the largest of the noise, from which on a movement i
 
 
 @dataclass(frozen=True)
-class Swing:
+class PlantSwing:
     """The movement of one measured signal from the event on, and how far the model is off it [pu of the rating].
 
     ``largest``, ``rms``: of the measured signal less its value before the event; ``noise``: the largest that its
@@ -56,7 +56,7 @@ class Swing:
         }
 
 
-def swings_of(comparison: EventComparison) -> Mapping[str, Swing]:
+def swings_of(comparison: EventComparison) -> Mapping[str, PlantSwing]:
     """The swings of P and Q of one event, by name."""
     event = comparison.event
     recording, power = event.recording, event.start.power
@@ -66,7 +66,7 @@ def swings_of(comparison: EventComparison) -> Mapping[str, Swing]:
         measured, simulated = comparison.measured[name], comparison.simulated[name]
         moved, error = measured[part] - before, (simulated - measured)[part]
         noise = largest_of_noise(noise_in(recording, measured, event.windows), len(moved))
-        found[name] = Swing(*_sizes(moved), noise, *_sizes(error))
+        found[name] = PlantSwing(*_sizes(moved), noise, *_sizes(error))
     return found
 
 

@@ -13,7 +13,7 @@ from orchestrator.studies.validation.event import EventComparison, JumpDoubt
 from orchestrator.studies.validation.fit import Fit, FittedParameter, Untold
 from orchestrator.studies.validation.limits import Criterion, LimitVerdict, OpenCause
 from orchestrator.studies.validation.questions import Question, QuestionKind
-from orchestrator.studies.validation.swing import Swing, swings_of
+from orchestrator.studies.validation.swing import PlantSwing, swings_of
 
 Figures = Mapping[str, Any]
 
@@ -398,7 +398,7 @@ def yardstick_sentence(comparisons: Sequence[EventComparison]) -> str:
     return " ".join(said)
 
 
-def _off(swing: Swing) -> str:
+def _off(swing: PlantSwing) -> str:
     part, rms_part = swing.part or 0.0, swing.rms_part or 0.0
     return f"up to {part:.0%} of the {swing.largest:.3g} pu that the plant swings ({rms_part:.0%} in the mean)"
 
