@@ -23,6 +23,7 @@ from orchestrator.studies.validation.figures import (
     signals_of,
 )
 from orchestrator.studies.validation.filled import Mask, runs_of
+from orchestrator.studies.validation.other_event import ask_of_other_event
 from orchestrator.studies.validation.parameters import NEVER
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.record import PortBases, Recording, questions_of_level
@@ -346,7 +347,8 @@ def _of_response(comparison: EventComparison) -> list[Question]:
     found += _assumed_bases(comparison.device)
     found += _slow_samples(comparison)
     found += _without_noise(comparison)
-    found += ask_of_setpoint(event.recording, event.windows, played.power)
+    of_other = ask_of_other_event(event.recording, played.power)
+    found += of_other or ask_of_setpoint(event.recording, event.windows, played.power)
     return found
 
 

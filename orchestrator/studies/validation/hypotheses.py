@@ -176,6 +176,8 @@ READINGS = (
 def question_readings(comparison: EventComparison, bases: PortBases) -> list[Question]:
     """Return what another reading of the recording, or another clock, would explain."""
     event = comparison.event
+    if any(one.kind is QuestionKind.OTHER_EVENT for one in comparison.questions):
+        return []  # no reading makes one event of two
     error, moved = rms_error(comparison.played.power, event), rms_movement(event)
     scatter = (comparison.noise["p"].scatter, comparison.noise["q"].scatter)
     excess = [max(e * e - (_NOISY * n) ** 2, 0) ** 0.5 for e, n in zip(error, scatter, strict=True)]

@@ -90,12 +90,14 @@ def _ramps(recording: Recording, name: str, values: Numbers, first: int) -> Iter
         or rest > _STRAIGHT * abs(size)
     ):
         return
-    ones = np.ones_like(times)
-    if _error_beside(np.column_stack([ones, *blocks[2:]]), error) < _WORSE * rest:
+    columns = [np.ones_like(times), *blocks[2:]]
+    if _error_beside(np.column_stack(columns[:-1]), error) < _WORSE * rest:
         return
+    # the angle by itself, which is the sum of all that the frequency was off: a control that sums it up moves P so
+    drifts = _error_beside(np.column_stack(columns), error) < _WORSE * rest
     begin, until = (recording.begin + float(one) for one in ends)
     figures = {"signal": name, "offset": -float(size), "at": begin, "until": until}
-    yield Question(QuestionKind.SETPOINT, figures)
+    yield Question(QuestionKind.SETPOINT, figures | {"drifts": drifts})
 
 
 def _straightest(times: Numbers, error: Numbers) -> tuple[float, Numbers, tuple[float, float]]:

@@ -258,6 +258,13 @@ def _meter_elsewhere(x: Figures) -> str:
 
 def _setpoint(x: Figures) -> str:
     name = x["signal"].upper()
+    if x.get("drifts"):
+        return (
+            f"from {x['at']:.4g} to {x['until']:.4g} s {name} leaves the model's along a straight line, by "
+            f"{x['offset']:+.3g} pu, while the angle of the voltage drifts: did a setpoint ramp, or did a control "
+            "beyond the plant (AGC) move it? No droop or gain explains it; give the part before, with "
+            + Option.STOP
+        )
     if "until" in x:
         return (
             f"from {x['at']:.4g} to {x['until']:.4g} s {name} leaves the model's along a straight line, by "
@@ -267,6 +274,22 @@ def _setpoint(x: Figures) -> str:
     return (
         f"at {x['at']:.4g} s {name} leaves the model's by {x['offset']:+.3g} pu and stays, and the "
         "voltage does nothing then: did a setpoint change? No parameter explains it; give the part before, with --stop"
+    )
+
+
+def _other_event(x: Figures) -> str:
+    moves = f"P and Q move by {x['moves']:.3g} pu and more at {x['at']:.4g} s"
+    if "voltage_at" in x:
+        return (
+            f"the voltage jumps at {x['voltage_at']:.4g} s, where the model moves by {x['asked']:.3g} pu and the plant "
+            f"does nothing; {moves}, where the voltage does nothing: are they of another event, or do the clocks "
+            f"differ by {abs(x['at'] - x['voltage_at']):.3g} s? Give voltage, P and Q of one event and one clock, with "
+            + Option.CHANNEL
+        )
+    return (
+        f"{moves} and the voltage does not, neither its magnitude nor its angle: are P and Q of another event, or of "
+        "another plant? Through any line they would move the voltage as well. Give voltage, P and Q of one event, with "
+        + Option.CHANNEL
     )
 
 
@@ -327,6 +350,7 @@ _SENTENCES: Mapping[QuestionKind, Callable[[Figures], str]] = {
     QuestionKind.CLOCKS: _clocks,
     QuestionKind.METER_ELSEWHERE: _meter_elsewhere,
     QuestionKind.SETPOINT: _setpoint,
+    QuestionKind.OTHER_EVENT: _other_event,
     QuestionKind.TOO_GOOD: _too_good,
     QuestionKind.NOISE: _noise,
     QuestionKind.NO_NOISE: _no_noise,
