@@ -41,6 +41,7 @@ FMUS = (
     "gfl_l2ep",
     "regfm_a1_phasor",
     "regfm_b1_phasor",
+    "regfm_c1_phasor",
     "infinite_bus",
     "external_grid",
     "static_generation",

@@ -114,6 +114,13 @@ REFERENCES = (
         ("i_re", "i_im", "e_re", "e_im", "omega", "E_inner"),
     ),
     Reference(
+        "regfm_c1_phasor",
+        "fmus/regfm_c1/reference.csv",
+        {"P_0": 0.6, "Q_0": 0.05, "dbVL1": 0.0, "dbVH1": 0.0},
+        *_BUS,
+        ("i_re", "i_im", "e_re", "e_im", "omega", "E_inner", "P_forming"),
+    ),
+    Reference(
         "regca1_repca1_phasor",
         "fmus/wecc_renewable/reference.csv",
         {"P_0": 0.8, "Q_0": 0.05, "plant.Fflag": 1.0, "plant.RefFlag": 1.0},

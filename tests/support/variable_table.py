@@ -29,6 +29,7 @@ LEAFLETS = {
     "static_generation_phasor": ROOT / "fmus" / "static_generation" / "README.md",
     "regfm_a1_phasor": ROOT / "fmus" / "regfm_a1" / "README.md",
     "regfm_b1_phasor": ROOT / "fmus" / "regfm_b1" / "README.md",
+    "regfm_c1_phasor": ROOT / "fmus" / "regfm_c1" / "README.md",
     "csvgn1_phasor": ROOT / "fmus" / "static_var" / "README.md",
     "svsmo1_phasor": ROOT / "fmus" / "static_var" / "README.md",
     "csvgn3_phasor": ROOT / "fmus" / "static_var" / "README.md",

@@ -107,6 +107,15 @@ ALL_PATHS_OPEN = {
         "VdrpFlag": True,
         "ImaxF": 0.55,
     },
+    "regfm_c1_phasor": {
+        "communication_step": 5e-3,
+        "dbVL1": 0.0,
+        "dbVH1": 0.0,
+        "Vmin": 0.5,
+        "PQFlag": False,
+        "Imax": 0.7,
+        "Kf": 0.9,
+    },
     "regfm_a1_phasor": {
         "communication_step": 5e-3,
         "RL": 0.01,
