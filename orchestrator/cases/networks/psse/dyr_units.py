@@ -14,6 +14,7 @@ from orchestrator.cases.networks.psse.limiter_records import LIMITERS
 from orchestrator.cases.networks.psse.machine_model import (
     CLASSICAL,
     COMPENSATION,
+    COMPENSATORS,
     MANUAL,
     WITHOUT_INERTIA,
 )
@@ -204,6 +205,11 @@ def with_infinite_buses(rows: Sequence[UnitRow], machines: Sequence[Machine]) ->
     ]
 
 
+def _without_active_power(row: UnitRow) -> UnitRow:
+    """Return a compensator's unit, which has no part in what an outage takes away, whatever PT and PB say."""
+    return replace(row, p_min_mw=0.0, p_max_mw=0.0)
+
+
 def with_records(
     rows: Sequence[UnitRow],
     machines: Sequence[Machine],
@@ -231,7 +237,7 @@ def with_records(
             own = {"gfor": model.parameters}
             found.append(
                 replace(
-                    row,
+                    _without_active_power(row) if model.converter in COMPENSATORS else row,
                     parameters=own,
                     parts=model.parts,
                     converter=model.converter,

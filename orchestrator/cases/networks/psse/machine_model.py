@@ -18,6 +18,9 @@ GRID_FORMING_RECORDS = REGFM_A1_RECORDS | REGFM_B1_RECORDS
 
 OTHER_RECORDS = STATIC_VAR_RECORDS | DISTRIBUTED_RECORDS | INDUCTION_RECORDS
 
+COMPENSATORS = frozenset(record.part for record in STATIC_VAR_RECORDS.values())
+"""Models that feed no active power."""
+
 KNOWN_RECORDS = DYR_RECORDS | GRID_FORMING_RECORDS | PLANT_RECORDS | OTHER_RECORDS
 ON_SHAFT = ("aerodynamics", "pitch", "torque")
 """Kinds of records of a wind turbine that act on its shaft."""

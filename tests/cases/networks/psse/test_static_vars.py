@@ -180,6 +180,21 @@ def test_a_solved_file_gives_the_system_what_its_shunt_feeds(gfor, tmp_path, rev
     assert unit["q_mvar"] == pytest.approx(30.0 * v**2, abs=0.01)
 
 
+def test_it_has_no_part_in_the_power_that_a_lost_machine_fed(gfor, tmp_path):
+    """By rating it would take a quarter of it, which it cannot feed."""
+    files = with_shunt(tmp_path)
+    assert gfor("new", *files, "--out", tmp_path / "case.toml")[0] == 0
+    code, out, err = gfor(
+        *("modes", tmp_path / "case.toml", "--scenario", "base"),
+        *("--set", "sg3.connected=false", "--json"),
+    )
+    assert code == 0, err
+    (scenario,) = json.loads(out)["scenarios"]
+    fed = {x["bus"]: x["p_mw"] for x in scenario["power_flow"]["machines"]}
+    assert fed["bus_8"] == pytest.approx(0, abs=1e-6)
+    assert fed["bus_1"] + fed["bus_2"] > 71.6 + 163 + 84
+
+
 def test_its_strategy_at_low_voltage_is_asked_about(gfor, tmp_path):
     code, out, err = gfor(
         "new", *with_shunt(tmp_path, uv1="0.6"), "--out", tmp_path / "case.toml", "--json"
