@@ -46,7 +46,7 @@ SHAFT = (
     number("H", 5.0, "Inertia constant of turbine and generator", 1e-3, "s"),
     power("DAMP", 0.0, "Torque by the generator's speed away from that of the operating point"),
     number("Htfrac", 0.9, "Share of the turbine in the inertia; 0: one mass", 0),
-    number("Freq1", 1.8, "Frequency at which the shaft swings", 1e-3, "Hz"),
+    number("Freq1", 1.8, "Frequency at which the shaft swings; above 0 with two masses", 0, "Hz"),
     power("Dshaft", 1.5, "Torque by the difference of both speeds", 0),
 )
 AERODYNAMICS = (
@@ -189,6 +189,10 @@ class Turbine:
         one = p.Htfrac <= 0
         turbine, generator = (if_else(one, 1, share) * p.H for share in (p.Htfrac, 1 - p.Htfrac))
         m.require(1 - p.Htfrac, "shaft.Htfrac: the turbine's share of the inertia lies below 1")
+        no_shaft = (
+            "shaft.Freq1 lies above 0 where shaft.Htfrac does: two masses swing; or set Htfrac = 0"
+        )
+        m.require(if_else(one, 1, p.Freq1), no_shaft)
         between = self._of_turbine - self.speed
         through = self._twist + p.Dshaft * between
         alone = (P_m / w - braking) / (2 * p.H)

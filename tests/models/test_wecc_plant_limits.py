@@ -74,6 +74,7 @@ def test_a_battery_draws_within_its_current():
             "Theta0 lies beyond TetaMin",
         ),
         ("REGCA1 REECA1 WTDTA1", {"shaft.Htfrac": 1.0}, "lies below 1"),
+        ("REGCA1 REECA1 WTDTA1", {"shaft.Freq1": 0.0}, "shaft.Freq1 lies above 0"),
     ],
 )
 def test_an_operating_point_that_cannot_be_is_refused(records, values, words):
@@ -177,7 +178,13 @@ def test_the_shaft_swings_at_its_frequency():
 
 def test_one_mass_has_the_whole_inertia():
     """Constant power of the wind against 0.1 pu more: 2·H·ω' = −ΔP/ω, at the speed 0.86 of 0.6 pu."""
-    values = {"shaft.Htfrac": 0.0, "shaft.H": 4.0, "torque.Twref": 1e4, "torque.Kip": 0.0}
+    values = {
+        "shaft.Htfrac": 0.0,
+        "shaft.Freq1": 0.0,
+        "shaft.H": 4.0,
+        "torque.Twref": 1e4,
+        "torque.Kip": 0.0,
+    }
     device = Evaluated(wecc_plant_phasor(WIND), AT | values | {"torque.Kpp": 0.0})
     x = device.vector(device.states | {"I_p": 0.7})
     rate = device.rates([1.0, 0.0], x)["shaft.speed_of_generator"]

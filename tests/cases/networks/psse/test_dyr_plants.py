@@ -238,6 +238,24 @@ def test_other_records_are_one_plant(records, prepared):
         assert (given["torque.P3"], given["shaft.Freq1"]) == (0.6, 1.6)
 
 
+OF_GRIDPACK = (
+    "3 'WTARA1' '1 ' 1 0.007 /\n",
+    "3 'WTPTA1' '1 ' 25 150 30 0 0 0.3 27 0 10 -10 /\n",
+    "3 'WTTQA1' '1 ' 1 0.5 2.5 0.066667 60 1.1 0 0.2 0.58 0.4 0.72 0.72 0.866 0.86 1 0 /\n",
+    "3 'WTDTA1' '1 ' 5 0.5 0 0 0 /\n",
+)
+"""A turbine of GridPACK's example kundur-twoarea_4renewable_mech.dyr: one mass, without a frequency of its shaft."""
+
+
+def test_a_turbine_of_one_mass_needs_no_frequency_and_its_slope_is_asked_about(prepared):
+    """The values of WTARA1 stand there in the other order: the slope of power by the pitch would be 1."""
+    ready = prepared(with_records(OF_REGCA1, line("REECA1", BATTERY), *OF_GRIDPACK), "")
+    given = unit(ready).parameters
+    assert (given["shaft.Htfrac"], given["shaft.Freq1"], given["shaft.DAMP"]) == (0.0, 0.0, 0.5)
+    (asked,) = [q.text for q in ready.questions if "aerodynamics.Ka" in q.text]
+    assert "0.007; an example of GridPACK has Theta0 before it" in asked
+
+
 @pytest.mark.parametrize(
     ("records", "shortest"),
     [("REGCB1 REECC1", 0.32), ("REGCA1 REECA1 WTDTA1 WTARA1 WTPTA1 WTTQA1", 0.16)],
