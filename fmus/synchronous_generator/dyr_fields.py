@@ -56,8 +56,8 @@ class DyrRecord:
     ``fields``: in the file's order; ``lacks``: parameters of our part that 0 leaves out, as the record has none;
     ``omissions``: what our part leaves out where a field, by its name, is not 0;
     ``without``: switches of our part that are off, as the record does not have what they switch; ``switched_on``:
-    those that are on, as the record always has it; ``sums``: limiters, by their kind, whose signal an exciter adds to
-    its voltage reference: always, or where a field has a value, as ``UEL=1``."""
+    those that are on, as the record always has it; ``hears``: where limiters, by their kind, act on an exciter: ``0``
+    added to its voltage reference, ``1`` or ``2`` at a gate; behind ``UEL=2:`` where that field has that value."""
 
     kind: str
     part: str
@@ -66,7 +66,7 @@ class DyrRecord:
     omissions: Mapping[str, str] = field(default_factory=dict)
     without: tuple[str, ...] = ()
     switched_on: tuple[str, ...] = ()
-    sums: Mapping[str, str] = field(default_factory=dict)
+    hears: Mapping[str, str] = field(default_factory=dict)
 
 
 SIGNALS_OF_BUSES = (2, 5, 6)
@@ -145,7 +145,7 @@ def _record(table: Mapping[str, Any]) -> DyrRecord:
         table.get("omissions", {}),
         without=names_of("without"),
         switched_on=names_of("switched_on"),
-        sums=table.get("sums", {}),
+        hears=table.get("hears", {}),
     )
 
 

@@ -26,7 +26,7 @@ from fmus.synchronous_generator.excitation.two_limits import bbsex1
 from fmus.synchronous_generator.excitation.without_regulator import external, manual
 from fmus.synchronous_generator.limiters.common import Limiter, Limiters
 from fmus.synchronous_generator.limiters.overexcitation import maxex1, maxex2
-from fmus.synchronous_generator.limiters.underexcitation import mnlex2
+from fmus.synchronous_generator.limiters.underexcitation import mnlex2, uel1
 from fmus.synchronous_generator.machine import FluxDeclaration, Machine
 from fmus.synchronous_generator.machines.classical import classical
 from fmus.synchronous_generator.machines.standard import (
@@ -148,7 +148,7 @@ STABILIZERS: dict[str, Stabilizer | None] = {
     "pod_input": pod_input,
 }
 OELS: dict[str, Limiter | None] = {NONE: None, "maxex1": maxex1, "maxex2": maxex2}
-UELS: dict[str, Limiter | None] = {NONE: None, "mnlex2": mnlex2}
+UELS: dict[str, Limiter | None] = {NONE: None, "mnlex2": mnlex2, "uel1": uel1}
 """Limiters of over- and of underexcitation."""
 
 WITH_POD = {"_pod": False, "_pod_input": True}

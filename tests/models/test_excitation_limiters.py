@@ -176,9 +176,9 @@ GENERATOR = "102 'GENROU' 1 7.4 0.03 0.5 0.05 3.1 0.0 1.25 1.2 0.35 0.5 0.25 0.0
 EXST1 = "102 'EXST1' 1 0.01 99 -99 0 0 100 0.02 9 -9 0 0 1 /\n"
 
 
-def ends(dyr, tmp_path, changed, until):
+def ends(dyr, tmp_path, changed, until, exciter=EXST1):
     network, _ = three_buses()
-    one = OneMachine(GENERATOR + EXST1 + dyr, tmp_path, network, torque=True)
+    one = OneMachine(GENERATOR + exciter + dyr, tmp_path, network, torque=True)
     return one.run(network.lines, until, every=0.5, changed=changed)
 
 
@@ -208,6 +208,99 @@ def test_a_machine_that_is_asked_for_too_little_ends_beside_its_circle(tmp_path)
     assert beyond(rows[-1]) == pytest.approx(signal / 0.1, rel=0.02)
     assert 0.01 < signal < 0.05
     assert beyond(free[-1]) > 2 * beyond(rows[-1])
+
+
+CIRCLE_UEL1 = {"K_UR": 1.95, "K_UC": 1.38, "T_U1": 0.1, "T_U2": 0.4, "T_U4": 0.05}
+
+
+def excess_of_uel1(i):
+    return abs(1.38 * V_T - 1j * i) - 1.95 * V_T
+
+
+def test_uel1_has_its_edge_on_a_circle_above_zero():
+    """(Q − K_UC·v²)² + P² = (K_UR·v²)²."""
+    for angle in (-2.0, -1.5, -1.0):
+        S = V_T**2 * (1.38j + 1.95 * np.exp(1j * angle))
+        assert excess_of_uel1(np.conj(S / V_T)) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(("low", "Q"), [(-18.0, -0.1), (-18.0, -0.9), (0.0, -0.1), (0.0, -0.9)])
+def test_uel1_without_an_integral_gives_its_gain_times_the_excess(low, Q):
+    i = np.conj((0.7 + 1j * Q) / V_T)
+    alone = limiter(CIRCLE_UEL1 | {"K_UL": 5.0, "V_ULMIN": low}, uel=UELS["uel1"])
+    assert not refused(alone)
+    assert max(map(abs, alone.rates([E_FD, E_FD, 0.7, -0.1]).values())) < 1e-12
+    found, _ = integrated(alone, lambda t: [E_FD, E_FD, i.real, i.imag], 4.0)
+    wanted = max(5.0 * excess_of_uel1(i), low)
+    assert found[-1]["v_s"] == pytest.approx(wanted, abs=1e-3)
+    assert found[-1]["uel.acts"] == (wanted > max(low, -18.0) + 1e-6)
+
+
+def test_uel1_integrates_the_excess_and_stops_at_its_limits():
+    values = CIRCLE_UEL1 | {"K_UL": 0.0, "K_UI": 2.0, "V_UIMIN": 0.0, "V_UIMAX": 0.5}
+    alone = limiter(values, uel=UELS["uel1"])
+    i = np.conj((0.7 - 0.9j) / V_T)
+    found, x = integrated(alone, lambda t: [E_FD, E_FD, i.real, i.imag], 0.4)
+    within = 2.0 * excess_of_uel1(i) * 0.4
+    state = [s.name for s in alone.model.states].index("uel.integrator")
+    assert x[state] == pytest.approx(within, rel=1e-6)
+    found, x = integrated(alone, lambda t: [E_FD, E_FD, i.real, i.imag], 6.0, x=x)
+    assert found[-1]["v_s"] == pytest.approx(0.5, abs=1e-6)
+    found, _ = integrated(alone, lambda t: [E_FD, E_FD, 0.7, -0.1], 3.0, x=x)
+    assert found[-1]["v_s"] == pytest.approx(0.0, abs=1e-3)
+
+
+AT_GATES = [
+    *(("dc1a", 1), ("dc2a", 1), ("ac4a", 1), ("st1a", 1), ("esst2a", 1)),
+    *(("ac1a", 2), ("st1a", 2)),
+]
+
+
+@pytest.mark.parametrize(("name", "gate"), AT_GATES)
+def test_at_a_gate_the_higher_signal_drives_the_exciter(name, gate):
+    """Outside of the circle the exciter follows the limiter; within it, it is the exciter without one."""
+    on = {"uel.gate": gate, "uel.K_UL": 99.0, "uel.T_U2": 0.0}
+    outside = {"uel.K_UR": 0.5, "uel.K_UC": 0.0}
+    at = [BUS.real, BUS.imag]
+    device = Evaluated(synchronous_generator_phasor(exciter=name, uel="uel1"), AT_BUS | on)
+    assert not refused(device)
+    assert max(map(abs, device.rates(at).values())) < 1e-8
+    assert device.outputs(at)["uel.acts"] == 0
+    free = Evaluated(synchronous_generator_phasor(exciter=name), AT_BUS)
+    x = free.x + 0.001
+    states = [s.name for s in device.model.states]
+    moved = device.x + 0.0
+    moved[[states.index(s.name) for s in free.model.states]] = x
+    found, alone = device.rates(at, moved), free.rates(at, x)
+    assert {key: found[key] for key in alone} == pytest.approx(alone, rel=1e-9, abs=1e-9)
+    lifted = Evaluated(
+        synchronous_generator_phasor(exciter=name, uel="uel1"), AT_BUS | on | outside
+    )
+    assert lifted.outputs(at)["uel.acts"] == 1
+    rises = lifted.outputs(at)["E_fd"] - free.outputs(at)["E_fd"]
+    assert max(rises, *lifted.rates(at).values()) > 0.1
+
+
+def test_a_machine_that_is_asked_for_too_little_follows_its_limiter_at_a_gate(tmp_path):
+    """Of K_UL = 0.05 before the amplifier of 100: the excess ends at E_fd/5, and not where the reference asks for."""
+    exciter = "102 'ESST1A' 1 2 1 0.01 99 -99 0 0 0 0 100 0.02 9 -9 9 -9 0 0 1 0 0 /\n"
+    record = "102 'UEL1' 1 1.9 1.3 0 5.8 5.8 0 0.05 18 -18 0 0.05 0 0 18 -18 /\n"
+    changed = {"exciter.delta_V_ref": -0.05}
+    rows = ends(record, tmp_path, changed, until=12.0, exciter=exciter)
+    (_, first, _), (_, out, v) = rows[0], rows[-1]
+    i = (2 * v[102] - v[101] - v[103]) / (0.01 + 0.12j)
+    found = abs(1.3 * v[102] - 1j * i) - 1.9 * abs(v[102])
+    assert (first["uel.acts"], out["uel.acts"]) == (0, 1)
+    assert found == pytest.approx(out["E_fd"] / 5, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["sexs", "st4b"])
+def test_a_gate_that_an_exciter_lacks_is_refused(name):
+    device = Evaluated(
+        synchronous_generator_phasor(exciter=name, uel="uel1"), AT_BUS | {"uel.gate": 1}
+    )
+    text = "uel.gate = 1: this exciter has no gate there; take 0, or another exciter"
+    assert refused(device) == [text]
 
 
 def test_limiters_need_a_regulator():

@@ -3,7 +3,7 @@
 Signals of a regulator are per unit of the terminal voltage (base S_n) before the gain and of E_fd after it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 from fmus.synchronous_generator import declarations, saturation
@@ -30,6 +30,31 @@ SOURCE = "typical data, IEEE 421.5"
 E_FD = "E_fd"
 
 
+BEFORE = 1  # place of a gate: before an exciter's amplifier
+BEHIND = 2  # place of a gate: behind it
+
+
+@dataclass(frozen=True)
+class Gate:
+    """A limiter's signal that lifts an exciter's own at a gate of the higher value.
+
+    ``signal``: the limiter's; ``place``: `BEFORE`, `BEHIND`, or 0 for no gate; ``met``: the exciter's own signals, by
+    the places that its diagram has."""
+
+    signal: Expr
+    place: Expr
+    met: dict[int, Expr] = field(default_factory=dict)
+
+    def is_at(self, place: int) -> Expr:
+        """Return whether the limiter acts at a place."""
+        return logic_and(self.place > place - 0.5, self.place < place + 0.5)
+
+    def lift(self, own: Expr, place: int) -> Expr:
+        """Return the higher one of both signals at a place of the exciter's diagram."""
+        self.met[place] = own
+        return if_else(self.is_at(place), fmax(own, self.signal), own)
+
+
 @dataclass(frozen=True)
 class Regulated:
     """Signals that an exciter sees: operating point, terminal and field current of its machine, and a stabiliser.
@@ -44,6 +69,11 @@ class Regulated:
     v_s_0: Scalar = 0.0  # the same in steady state
     i: Phasor = ZERO
     v_0: Phasor = ZERO
+    gate: Gate | None = None  # of a limiter of underexcitation
+
+    def lifted(self, own: Expr, place: int) -> Expr:
+        """An exciter's signal at a place of its diagram where a limiter may lift it."""
+        return own if self.gate is None else self.gate.lift(own, place)
 
     def terminal_voltage(self, E_fd: Expr) -> Expr:
         """|v_t| [pu, S_n] for an E_fd [pu]."""

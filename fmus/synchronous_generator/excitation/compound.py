@@ -21,6 +21,7 @@ library of phasor models at 6dc8ca5 (ESST3A, IEEET3), IEEE 421.5."""
 
 from fmus.synchronous_generator.data_lines import Given, declared, pu, seconds
 from fmus.synchronous_generator.excitation.common import (
+    BEFORE,
     SOURCE,
     Measurement,
     Regulated,
@@ -81,7 +82,8 @@ def esst2a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         E_fd = clamp(x, 0, high)
         V_F, _ = rate_feedback(m, E_fd, E_0, 0.05, 1.0)
         measured = Measurement(m, seen)
-        V_A = _amplifier(m, p, measured.error(V_A0 / p.K_A) - V_F, V_A0)
+        error = seen.lifted(measured.error(V_A0 / p.K_A) - V_F, BEFORE)
+        V_A = _amplifier(m, p, error, V_A0)
         rate = (V_A * source.available(seen.terminal(E_fd)) - p.K_E * E_fd) / p.T_E
         m.derivative(x, held_at_limits(x, rate, 0, high))
         return measured.close(E_fd)

@@ -1,12 +1,19 @@
 """Limiters of excitation as their voltage regulator hears them, and how they are put before it.
 
 A limiter's signal is added to the voltage reference, beside the stabiliser's. One that acts in the operating point has
-its signal in the reference of that point, so that the machine rests there."""
+its signal in the reference of that point, so that the machine rests there. A limiter of underexcitation may lift the
+exciter's signal instead, at a gate where the exciter's diagram has one."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from fmus.synchronous_generator.excitation.common import Exciter, Regulated
+from fmus.synchronous_generator.excitation.common import (
+    BEFORE,
+    BEHIND,
+    Exciter,
+    Gate,
+    Regulated,
+)
 from fmus.toolchain.blocks import RETURN_TIME
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else
@@ -27,12 +34,13 @@ def rate_within_limits(x: Expr, rate: Scalar, low: Scalar, high: Scalar) -> Expr
 class Limited:
     """A limiter that is declared and waits for the field voltage.
 
-    ``signal``: what it adds to the voltage reference [pu, S_n]; ``at_start``: the same in the operating point;
-    ``close``: gives it the field voltage [pu]."""
+    ``signal``: what it adds to the voltage reference [pu, S_n], or brings to a gate; ``at_start``: the same in the
+    operating point; ``close``: gives it the field voltage [pu]; ``at_rest``: the signal while it does not act."""
 
     signal: Expr
     at_start: Scalar
     close: Callable[[Expr], None]
+    at_rest: Scalar = 0.0
 
 
 Limiter = Callable[[ModelBuilder, Regulated], Limited]
@@ -47,12 +55,18 @@ class Limiters:
 
     def regulate(self, m: ModelBuilder, seen: Regulated, exciter: Exciter) -> tuple[Expr, Expr]:
         """Declare limiters and exciter and return its (E_fd, |v_t|) [pu]."""
-        limited = [_declare(m, seen, *each) for each in self._by_scope()]
-        signal: Scalar = sum((each.signal for each in limited), Expr(seen.v_s))
-        at_start: Scalar = sum((Expr(each.at_start) for each in limited), Expr(0))
-        E_fd, v_t = exciter(m, replace(seen, v_s=signal, v_s_0=at_start) if limited else seen)
-        for each in limited:
+        limited = {scope: _declare(m, seen, scope, x) for scope, x in self._by_scope()}
+        uel = limited.get("uel")
+        gate = None if uel is None else Gate(uel.signal, _place(m))
+        signal, at_start = Expr(seen.v_s), Expr(0)
+        for scope, each in limited.items():
+            share = if_else(gate.place > 0, 0, 1) if scope == "uel" and gate is not None else 1
+            signal, at_start = signal + share * each.signal, at_start + share * each.at_start
+        told = replace(seen, v_s=signal, v_s_0=at_start, gate=gate) if limited else seen
+        E_fd, v_t = exciter(m, told)
+        for scope, each in limited.items():
             each.close(E_fd)
+            _declare_outputs(m, scope, each, gate if scope == "uel" else None)
         return E_fd, v_t
 
     def _by_scope(self) -> list[tuple[str, Limiter]]:
@@ -64,10 +78,30 @@ WITHOUT = Limiters()  # of a machine that has no limiters
 
 
 def _declare(m: ModelBuilder, seen: Regulated, scope: str, limiter: Limiter) -> Limited:
-    """Declare a limiter in its scope, with outputs of its signal and of whether it acts."""
     with m.scope(scope):
-        limited = limiter(m, seen)
-        acts = if_else(limited.signal < -LEAST, 1, if_else(limited.signal > LEAST, 1, 0))
-        m.output("signal", limited.signal, "pu", "Added to the voltage reference", base="S_n")
+        return limiter(m, seen)
+
+
+def _place(m: ModelBuilder) -> Expr:
+    """Declare where the signal of a limiter of underexcitation acts."""
+    text = "Its signal is added to the reference (0), or lifts the exciter's before (1) or behind (2) its amplifier"
+    with m.scope("uel"):
+        return m.parameter("gate", 0.0, "1", text, minimum=0, maximum=BEHIND)
+
+
+def _declare_outputs(m: ModelBuilder, scope: str, limited: Limited, gate: Gate | None) -> None:
+    """Declare outputs of a limiter's signal and of whether it acts, and refuse a gate that the exciter lacks."""
+    away = limited.signal - limited.at_rest
+    acts = if_else(away < -LEAST, 1, if_else(away > LEAST, 1, 0))
+    for place in () if gate is None else (BEFORE, BEHIND):
+        assert gate is not None
+        if place in gate.met:
+            acts = if_else(gate.is_at(place), if_else(limited.signal > gate.met[place], 1, 0), acts)
+        else:
+            m.require(
+                if_else(gate.is_at(place), -1, 1),
+                f"uel.gate = {place}: this exciter has no gate there; take 0, or another exciter",
+            )
+    with m.scope(scope):
+        m.output("signal", limited.signal, "pu", "Signal to the voltage regulator", base="S_n")
         m.output("acts", acts, "1", "1 while the limiter acts, else 0")
-    return limited

@@ -15,7 +15,7 @@ from orchestrator.cases.networks.psse.dyr_mistakes import (
 )
 from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
 from orchestrator.cases.networks.psse.following_converters import models_of_following
-from orchestrator.cases.networks.psse.limiter_records import take_off_unheard
+from orchestrator.cases.networks.psse.limiter_records import place_limiters
 from orchestrator.cases.networks.psse.machine_model import (
     BY_SPEED,
     CLASSICAL,
@@ -107,7 +107,7 @@ def machine_models(
                 lines[key] |= dict.fromkeys(own, record.line)
             except InputError as error:
                 problems.append(str(error))
-    take_off_unheard([] if problems else records, left, parts, values)
+    place_limiters([] if problems else records, left, parts, values)
     for key in (key for key, machine in at.items() if machine.is_infinite and not of[key]):
         parts[key]["machine"] = CLASSICAL
         values[key] |= WITHOUT_INERTIA

@@ -1,6 +1,6 @@
-"""Limiters of excitation by their records of dynamics data, and the exciters that do not take their signal."""
+"""Limiters of excitation by their records of dynamics data: where their exciters take their signal, if at all."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
 from orchestrator.cases.networks.psse.dyr_records import DynamicRecord, given_values
@@ -8,50 +8,57 @@ from orchestrator.cases.networks.psse.dyr_records import DynamicRecord, given_va
 LIMITERS = ("oel", "uel")
 """Kinds of records that are limiters, of over- and of underexcitation."""
 
-UNHEARD = "a limiter of excitation whose signal its exciter does not add to the voltage reference"
+UNHEARD = "a limiter of excitation whose signal its exciter does not take where gfor's limiters act"
 
 
 def unheard_limiters(
     records: Sequence[DynamicRecord], left: Collection[str]
 ) -> list[DynamicRecord]:
-    """Return the limiters beside an exciter's record that takes their signal at a gate, or not at all.
+    """Return the limiters beside an exciter's record that takes their signal elsewhere, or not at all.
 
     ``left``: names of models that are left out."""
-    records = [record for record in records if record.name not in left]
-    exciters = {
-        (record.bus, record.machine): record
-        for record in records
-        if record.name in DYR_RECORDS and DYR_RECORDS[record.name].kind == "exciter"
-    }
-    found = []
-    for record in records:
-        known = DYR_RECORDS.get(record.name)
-        exciter = exciters.get((record.bus, record.machine))
-        if known is None or known.kind not in LIMITERS or exciter is None:
-            continue
-        if not _sums(exciter, known.kind):
-            found.append(record)
-    return found
+    return [record for record, place in _places(records, left) if place is None]
 
 
-def take_off_unheard(
+def place_limiters(
     records: Sequence[DynamicRecord],
     left: Collection[str],
     parts: Mapping[tuple[int, str], dict[str, str]],
     values: Mapping[tuple[int, str], dict[str, float]],
 ) -> None:
-    """Take limiters that their exciters do not hear off the machines' parts and parameters, by bus and identifier."""
-    for record in unheard_limiters(records, left):
+    """Set where limiters act, and take those that their exciters do not hear off, by machines' bus and identifier."""
+    for record, place in _places(records, left):
         key, kind = (record.bus, record.machine), DYR_RECORDS[record.name].kind
-        if parts.get(key, {}).pop(kind, None) is not None:
+        if key not in parts:
+            continue
+        if place:
+            values[key][f"{kind}.gate"] = place
+        elif place is None and parts[key].pop(kind, None) is not None:
             for name in [name for name in values[key] if name.startswith(f"{kind}.")]:
                 del values[key][name]
 
 
-def _sums(exciter: DynamicRecord, kind: str) -> bool:
-    """Return whether an exciter adds the signal of a kind of limiter to its voltage reference."""
+def _places(
+    records: Sequence[DynamicRecord], left: Collection[str]
+) -> Iterator[tuple[DynamicRecord, int | None]]:
+    """Yield limiters beside an exciter's record with their place there: 0 the reference, else a gate; None for none."""
+    known = [record for record in records if record.name in DYR_RECORDS and record.name not in left]
+    exciters = {
+        (record.bus, record.machine): record
+        for record in known
+        if DYR_RECORDS[record.name].kind == "exciter"
+    }
+    for record in known:
+        kind, exciter = DYR_RECORDS[record.name].kind, exciters.get((record.bus, record.machine))
+        if kind in LIMITERS and exciter is not None:
+            yield record, _place(exciter, kind)
+
+
+def _place(exciter: DynamicRecord, kind: str) -> int | None:
     known = DYR_RECORDS[exciter.name]
-    if kind not in known.sums:
-        return False
-    name, _, value = known.sums[kind].partition("=")
-    return not name or given_values(exciter, known.fields, DYR_RECORDS)[name] == float(value)
+    for choice in known.hears.get(kind, "").split():
+        condition, _, place = choice.rpartition(":")
+        name, _, value = condition.partition("=")
+        if not name or given_values(exciter, known.fields, DYR_RECORDS)[name] == float(value):
+            return int(place)
+    return None

@@ -13,6 +13,9 @@ from orchestrator.cases.networks.unit_row import DoubtOfRecord
 _HELD_BUS = "IB"
 """Field with the bus whose voltage a compensator holds; 0 and its own number are its terminal."""
 
+_LEAST_SIGNALS = ("uel.V_UIMIN", "uel.V_ULMIN")
+"""Lower limits of a limiter's signal [pu]; the higher one counts."""
+
 _SAME = 1e-3  # part by which two figures for one reactance may differ: files round them
 
 
@@ -21,6 +24,7 @@ def doubts_of_machine(
 ) -> Iterator[DoubtOfRecord]:
     yield from _omissions(records)
     yield from _chosen_limits(records)
+    yield from _offsets(records, values)
     x_d2, x_source = values.get("machine.X_d2"), machine.source.imag
     if x_d2 is None or abs(x_source - x_d2) <= _SAME * abs(x_d2):
         return
@@ -45,6 +49,21 @@ def _omissions(records: Sequence[DynamicRecord]) -> Iterator[DoubtOfRecord]:
                 said = f"{record.name} has {name} = {given[name]:g}: {text}"
                 kind = f"{record.name} without {name}"
                 yield DoubtOfRecord(known.kind, record.place, said, kind)
+
+
+def _offsets(
+    records: Sequence[DynamicRecord], values: Mapping[str, float]
+) -> Iterator[DoubtOfRecord]:
+    """Ask about a limiter whose signal is added to the voltage reference and rests far below 0."""
+    least = max((values.get(name, 0.0) for name in _LEAST_SIGNALS), default=0.0)
+    if least >= 0 or values.get("uel.gate", 0.0) > 0:
+        return
+    record = next(record for record in records if "uel.V_ULMIN" in _sets(record.name))
+    text = (
+        f"{record.name} rests at {least:g} pu, and its exciter adds that to the voltage reference: the limiter acts "
+        "before its limit; where it is added VULMIN is 0, at a gate far below: correct VULMIN, or the exciter's record"
+    )
+    yield DoubtOfRecord("uel.V_ULMIN", record.place, text, "a limiter that rests below 0 at a sum")
 
 
 def _sets(name: str) -> set[str]:

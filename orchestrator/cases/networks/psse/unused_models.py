@@ -84,7 +84,7 @@ def unused_models(
         changes.note(record.line, Remark(text, RESTS))
     for record in _named_in(records, uses, UNHEARD):
         text = (
-            f"{record.name} is not used: it is {UNHEARD}, and gfor has no gate for it. It acts at limits only. "
+            f"{record.name} is not used: it is {UNHEARD}. It acts at limits only. "
             "Does the machine start within them?"
         )
         changes.note(record.line, Remark(text, UNHEARD))

@@ -14,6 +14,7 @@ GENROU = "1 'GENROU' 1 8 0.03 0.4 0.05 6 0 1.8 1.7 0.3 0.55 0.25 0.2 0 0 /\n"
 MAXEX1 = "1 'MAXEX1' 1 2.5 1.1 120 1.2 40 1.5 15 1.0 0.002 -0.5 /\n"
 MAXEX2 = "1 'MAXEX2' 1 0 2.5 1.1 120 1.2 40 1.5 15 1.0 0.002 -0.5 /\n"
 MNLEX2 = "1 'MNLEX2' 1 0.1 1 0.3 0.5 0.1 2.5 3 /\n"
+UEL1 = "1 'UEL1' 1 1.95 1.38 0 5.8 5.8 0 100 18 -18 0 0.05 0 0 18 {} /\n"
 SEXS = "1 'SEXS' 1 0.1 10 100 0.1 0 5 /\n"
 ESST1A = "1 'ESST1A' 1 {} 1 0.01 99 -99 0 0 0 0 100 0.02 9 -9 9 -9 0 0 1 0 0 /\n"
 ESAC1A = "1 'ESAC1A' 1 0.01 0 0 100 0.02 9 -9 0.8 0.03 1 0.2 0.38 1 4.18 0.1 3.14 0.03 6 -5 /\n"
@@ -75,17 +76,43 @@ def used(tmp_path, *texts):
     [
         (SEXS, {"oel", "uel"}),
         (ESST1A.format(1), {"uel"}),
-        (ESST1A.format(2), set()),
-        (ESAC1A, set()),
+        (ESST1A.format(4), set()),
+        (ESAC1A, {"uel"}),
     ],
-    ids=["sums both", "sums the lower", "by its field at a gate", "both at gates"],
+    ids=["sums both", "sums the lower", "by its field at a gate", "a gate"],
 )
 def test_a_limiter_acts_where_its_exciter_adds_its_signal(exciter, heard, tmp_path):
     found, asked = used(tmp_path, exciter, MAXEX1, MNLEX2)
     assert found == heard
     assert len(asked) == 2 - len(heard)
     for text in asked:
-        assert "whose signal its exciter does not add to the voltage reference" in text
+        assert "whose signal its exciter does not take where gfor's limiters act" in text
+
+
+@pytest.mark.parametrize(
+    ("exciter", "gate"), [(ESST1A.format(2), 1), (ESST1A.format(3), 2), (ESAC1A, 2), (SEXS, None)]
+)
+def test_a_limiter_acts_at_the_gate_of_its_exciter(exciter, gate, tmp_path):
+    model, _, _ = read(tmp_path, GENROU + exciter + UEL1.format("-18"))
+    assert model.parts["uel"] == "uel1"
+    assert model.parameters.get("uel.gate") == gate
+
+
+@pytest.mark.parametrize(
+    ("exciter", "least", "asked"), [(SEXS, "-18", True), (SEXS, "0", False), (ESAC1A, "-18", False)]
+)
+def test_a_limiter_that_rests_below_zero_at_a_sum_is_asked_about(exciter, least, asked, tmp_path):
+    model, _, _ = read(tmp_path, GENROU + exciter + UEL1.format(least))
+    told = [doubt.text for doubt in model.doubts if doubt.variable == "uel.V_ULMIN"]
+    assert len(told) == asked
+    for text in told:
+        assert text.startswith("UEL1 rests at -18 pu, and its exciter adds that to the voltage")
+
+
+def test_the_input_of_uel1_that_is_left_out_is_asked_about(tmp_path):
+    record = UEL1.format("-18").replace("1.95 1.38 0 ", "1.95 1.38 3.3 ")
+    model, _, _ = read(tmp_path, GENROU + ESAC1A + record)
+    assert any("UEL1 has KUF = 3.3: the input of the exciter's" in d.text for d in model.doubts)
 
 
 def test_a_second_limiter_of_one_kind_is_refused(tmp_path):
