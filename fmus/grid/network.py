@@ -256,9 +256,9 @@ class Network:
         floating = [b for b in self.buses if self.floats(b)]
         if floating and not self.phasors:
             named = ", ".join(map(repr, floating[:10])) + (", …" if len(floating) > 10 else "")
-            many = len(floating) > 1
+            begin = f"bus {named} has" if len(floating) == 1 else f"buses {named} have"
             yield (
-                f"bus{'es' if many else ''} {named} {'have' if many else 'has'} neither a load with P > 0 nor line "
-                f"charging, so {'their' if many else 'its'} voltage is not determined; add a load, or B to a line "
+                f"{begin} neither a load with P > 0 nor line charging, so no voltage is determined there; "
+                "add a load, or B to a line "
                 "there, or give the network a small capacitance for such buses: stray_B = 0.05"
             )

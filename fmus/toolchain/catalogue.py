@@ -53,12 +53,14 @@ def _signature(name: str) -> dict[str, Any]:
     """A model's arguments, without importing it where they are noted."""
 
     def find() -> dict[str, Any]:
-        parameters = inspect.signature(_factory(name)).parameters.values()
         empty = inspect.Parameter.empty
+        defaults = {
+            p.name: p.default for p in inspect.signature(_factory(name)).parameters.values()
+        }
         return {
-            "needs_arguments": any(p.default is empty for p in parameters),
-            "parts": {p.name: p.default for p in parameters if isinstance(p.default, str)},
-            "has_network": any(p.name == "network" and p.default is not empty for p in parameters),
+            "needs_arguments": empty in defaults.values(),
+            "parts": {key: value for key, value in defaults.items() if isinstance(value, str)},
+            "has_network": defaults.get("network", empty) is not empty,
         }
 
     found: dict[str, Any] = noted(entry_of(name), "signature", find)

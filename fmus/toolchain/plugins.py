@@ -39,10 +39,10 @@ def entries_of(group: str) -> Mapping[str, tuple[EntryPoint, ...]]:
             f"the installed metadata of {OWN} declare no {group!r}: they are older than its code. Install it again: "
             f"`pip install -e .` in the checkout, or `pip install --force-reinstall --no-deps {OWN}`"
         )
-    return {
-        name: tuple(entry for entry in entries if entry.name == name)
-        for name in dict.fromkeys(entry.name for entry in entries)
-    }
+    by_name: dict[str, tuple[EntryPoint, ...]] = {}
+    for entry in entries:
+        by_name[entry.name] = (*by_name.get(entry.name, ()), entry)
+    return by_name
 
 
 @cache

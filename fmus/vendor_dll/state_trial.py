@@ -51,11 +51,16 @@ class InstanceStructure(c.Structure):
     """The structure that a host hands to every call for one instance."""
 
     _fields_ = (
-        *((name, c.c_void_p) for name in ("inputs", "outputs", "parameters")),
+        ("inputs", c.c_void_p),
+        ("outputs", c.c_void_p),
+        ("parameters", c.c_void_p),
         ("time", c.c_double),
         ("mode", c.c_uint8),
-        *((name, c.c_void_p) for name in ("error", "message")),
-        *((name, c.c_void_p) for name in ("ints", "floats", "doubles")),
+        ("error", c.c_void_p),
+        ("message", c.c_void_p),
+        ("ints", c.c_void_p),
+        ("floats", c.c_void_p),
+        ("doubles", c.c_void_p),
     )
 
 

@@ -90,19 +90,16 @@ def _band_lines(letter: str) -> Sequence[Line]:
     """Parameters of one band."""
     name, gain, lag, limit = _BANDS[letter]
     lags = {1: lag, 2: lag * _SPREAD, 7: lag * _SPREAD, 8: lag * _SPREAD**2}
+    times = [
+        seconds(f"T_{letter}{k}", lags.get(k, 0.0), f"Time constant {k} of the {name} band")
+        for k in range(1, 13)
+    ]
     return (
-        *(
-            power(f"K_{letter}{k}", _BRANCH_GAIN, f"Gain of branch {branch} of the {name} band")
-            for k, branch in ((1, 1), (2, 2))
-        ),
-        *(
-            number(f"K_{letter}{k}", 1.0, f"Constant of branch {branch} of the {name} band")
-            for k, branch in ((11, 1), (17, 2))
-        ),
-        *(
-            seconds(f"T_{letter}{k}", lags.get(k, 0.0), f"Time constant {k} of the {name} band")
-            for k in range(1, 13)
-        ),
+        power(f"K_{letter}1", _BRANCH_GAIN, f"Gain of branch 1 of the {name} band"),
+        power(f"K_{letter}2", _BRANCH_GAIN, f"Gain of branch 2 of the {name} band"),
+        number(f"K_{letter}11", 1.0, f"Constant of branch 1 of the {name} band"),
+        number(f"K_{letter}17", 1.0, f"Constant of branch 2 of the {name} band"),
+        *times,
         power(f"K_{letter}", gain, f"Gain of the {name} band"),
         power(f"V_{letter}MAX", limit, f"Upper limit of the {name} band"),
         power(f"V_{letter}MIN", -limit, f"Lower limit of the {name} band"),

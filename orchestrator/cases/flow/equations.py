@@ -77,11 +77,12 @@ class FlowEquations:
             impedance[position[load.bus]] += of_impedance / SYSTEM_BASE_MVA
         for bus, power in active.items():
             fed[position[bus]] += power
+        rows, columns, admittances = zip(*triplets, strict=True) if triplets else ((), (), ())
         return cls(
             buses=tuple(buses),
-            rows=np.array([t[0] for t in triplets], dtype=np.int64),
-            columns=np.array([t[1] for t in triplets], dtype=np.int64),
-            admittances=np.array([t[2] for t in triplets], dtype=np.complex128),
+            rows=np.array(rows, dtype=np.int64),
+            columns=np.array(columns, dtype=np.int64),
+            admittances=np.array(admittances, dtype=np.complex128),
             fed=fed,
             slack=position[slack_bus],
             held=np.array([bus in held for bus in buses]),

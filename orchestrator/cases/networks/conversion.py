@@ -362,9 +362,8 @@ def _joined_legs(line: Line, other: Line) -> Line | None:
         line.from_bus,
         X,
         R,
-        0.0,
-        other.tap / line.tap,
-        other.shift - line.shift,
+        tap=other.tap / line.tap,
+        shift=other.shift - line.shift,
     )
 
 
@@ -394,17 +393,17 @@ def _transformer(star: str, legs: list[Line]) -> ThreeWinding | None:
     # the ratio is at the star: taken to the other side
     turned = [leg.from_bus == star for leg in legs]
     square = [leg.tap**2 if inner else 1.0 for leg, inner in zip(legs, turned, strict=True)]
+    ratios, shifts = [], []
+    for leg, inner in zip(legs, turned, strict=True):
+        ratios.append(1 / leg.tap if inner else leg.tap)
+        shifts.append(-leg.shift if inner else leg.shift)
     found = ThreeWinding(
         f"transformer_{star.removeprefix('bus_')}",
         (ends[0], ends[1], ends[2]),
         _three([leg.X * n for leg, n in zip(legs, square, strict=True)]),
         _three([leg.R * n for leg, n in zip(legs, square, strict=True)]),
-        _three(
-            [1 / leg.tap if inner else leg.tap for leg, inner in zip(legs, turned, strict=True)]
-        ),
-        _three(
-            [-leg.shift if inner else leg.shift for leg, inner in zip(legs, turned, strict=True)]
-        ),
+        _three(ratios),
+        _three(shifts),
     )
     return found if found.is_passive and len(set(ends)) == 3 else None
 

@@ -135,7 +135,7 @@ def network_data(
     found = _source(table, directory, slack, modelled)
     source = found.network
     lines = [
-        Line(n, t.from_bus, t.to_bus, t.X, t.R, t.B, t.tap, t.shift, t.X_C)
+        Line(n, t.from_bus, t.to_bus, t.X, t.R, B=t.B, tap=t.tap, shift=t.shift, X_C=t.X_C)
         for n, t in table.lines.items()
     ]
     loads = [with_laws(Load(n, t.bus, t.p, t.q), table, t) for n, t in table.loads.items()]
@@ -158,17 +158,14 @@ def network_data(
     if not buses:  # no list of buses to check the lines' ends against: the ends define the buses
         ends = [bus for line in lines for bus in (line.from_bus, line.to_bus)]
         buses = dict.fromkeys([*ends, *(bus for x in transformers for bus in x.buses)])
+    of_source = [
+        with_laws(x, table, parts=source.load_parts.get(x.name, (0j, 0j))) for x in source.loads
+    ]
+    of_devices = [with_laws(x, table, device_laws(table)) for x in found.device_loads]
     return NetworkData(
         tuple(buses),
         (*source.lines, *lines),
-        loads=(
-            *(
-                with_laws(x, table, parts=source.load_parts.get(x.name, (0j, 0j)))
-                for x in source.loads
-            ),
-            *(with_laws(x, table, device_laws(table)) for x in found.device_loads),
-            *loads,
-        ),
+        loads=(*of_source, *of_devices, *loads),
         shunts=(*source.shunts, *shunts),
         generation=source.generation,
         slack=source.slack,

@@ -3,6 +3,7 @@ constant impedance and current that a source tells apart."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from fmus.grid.element_data import LAWS, Load, Zip
 from orchestrator.cases.form.remedies import WITHOUT_PARTS
@@ -89,26 +90,21 @@ def with_laws(
         m for m in (own, table.generation_model if feeds else table.load_model) if m is not None
     ]
     usual: LoadLaw = "current" if feeds else "impedance"
+
+    def first(key: str, otherwise: Any) -> Any:
+        """The value of the first model that has one."""
+        given = (getattr(model, key) for model in models)
+        return next((value for value in given if value is not None), otherwise)
+
+    active, reactive = (_law(first(key, usual)) for key in ("active", "reactive"))
     return replace(
         load,
-        active=_mixed(
-            load,
-            "P",
-            _law(next((m.active for m in models if m.active is not None), usual)),
-            load.p_mw,
-            (parts[0].real, parts[1].real),
-        ),
-        reactive=_mixed(
-            load,
-            "Q",
-            _law(next((m.reactive for m in models if m.reactive is not None), usual)),
-            load.q_mvar,
-            (parts[0].imag, parts[1].imag),
-        ),
-        k_pf=next((m.k_pf for m in models if m.k_pf is not None), 0.0),
-        k_qf=next((m.k_qf for m in models if m.k_qf is not None), 0.0),
-        v_min=next((m.v_min for m in models if m.v_min is not None), None),
-        tau=next((m.tau for m in models if m.tau is not None), None),
+        active=_mixed(load, "P", active, load.p_mw, (parts[0].real, parts[1].real)),
+        reactive=_mixed(load, "Q", reactive, load.q_mvar, (parts[0].imag, parts[1].imag)),
+        k_pf=first("k_pf", 0.0),
+        k_qf=first("k_qf", 0.0),
+        v_min=first("v_min", None),
+        tau=first("tau", None),
     )
 
 

@@ -51,6 +51,7 @@ def power_flow_json(prepared: PreparedScenario) -> dict[str, Any] | None:
     total = sum(machine["p_mw"] for machine in machines)
     slack = [machine for machine in machines if machine["bus"] == flow.slack]
     fed = sum(machine["p_mw"] for machine in slack)
+    losses = sum(branch["losses_mw"] for branch in branches)
     return {
         "residual_pu": flow.residual,
         "slack": {
@@ -60,7 +61,7 @@ def power_flow_json(prepared: PreparedScenario) -> dict[str, Any] | None:
             "share_percent": 100 * fed / total if total else None,
         },
         "generation_mw": total,
-        "losses_mw": sum(branch["losses_mw"] for branch in branches),
+        "losses_mw": losses,
         "buses": [
             {
                 "name": bus,

@@ -330,6 +330,7 @@ class Preparer:
             *self._area_questions(),
         ]
         plans = draft.system.components
+        values = {f"{n}.{v}": x for n, p in plans.items() for v, x in p.parameters.items()}
         return PreparedScenario(
             self._case,
             draft.given.name,
@@ -343,8 +344,7 @@ class Preparer:
             events=events,
             relays=relays,
             power_flow=flow,
-            values={f"{n}.{v}": x for n, p in plans.items() for v, x in p.parameters.items()}
-            | imperfections,
+            values=values | imperfections,
             questions=tuple(draft.found.questions),
             records=tuple(draft.found.records),
             about_rows=(*about_rows, *left_out),

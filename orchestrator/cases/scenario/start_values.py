@@ -122,21 +122,26 @@ def _acting(
 
 
 def _lines(network: Network, grid: ComponentPlan) -> list[FlowLine]:
-    return [
-        FlowLine(
-            line.name,
-            line.from_bus,
-            line.to_bus,
-            R=grid.number(line.variable("R")),
-            X=grid.number(line.variable("X"))
-            - (grid.number(line.variable("X_C")) if line.X_C else 0.0),
-            B=grid.number(line.variable("B")) if line.B else 0.0,
-            tap=grid.number(line.variable("tap")) if line.has_ratio else 1.0,
-            shift=grid.number(line.variable("shift")) if line.has_ratio else 0.0,
-            closed=all(is_connected(grid, switch) for switch in _switches(line)),
-        )
-        for line in network.lines
-    ]
+    return [_flow_line(line, grid) for line in network.lines]
+
+
+def _flow_line(line: Line, grid: ComponentPlan) -> FlowLine:
+    """A line with the values that the grid has now; it declares none that the network leaves out."""
+
+    def number(quantity: str, otherwise: float, *, declared: object = True) -> float:
+        return grid.number(line.variable(quantity)) if declared else otherwise
+
+    return FlowLine(
+        line.name,
+        line.from_bus,
+        line.to_bus,
+        R=number("R", 0.0),
+        X=number("X", 0.0) - number("X_C", 0.0, declared=line.X_C),
+        B=number("B", 0.0, declared=line.B),
+        tap=number("tap", 1.0, declared=line.has_ratio),
+        shift=number("shift", 0.0, declared=line.has_ratio),
+        closed=all(is_connected(grid, switch) for switch in _switches(line)),
+    )
 
 
 def _switches(line: Line) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ network's frame, ``p`` and ``q`` at the bus [pu, S_n]; parameters ``S_n`` [MVA] 
 [pu, S_n], ``v_0`` [pu], ``theta_0`` [rad]."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
@@ -248,14 +248,14 @@ class BoundDescription(FmuDescription):
             variables[name] = _passed(inner, port, name, own, len(PORT) + number)
         shared = {f.name: getattr(inner, f.name) for f in fields(FmuDescription)}
         renamed = {own: name for name, own in inner_names.items()}
+
+        def under_our_names(own: Sequence[str]) -> tuple[str, ...]:
+            return tuple(map(renamed.__getitem__, own)) if set(own) <= set(renamed) else ()
+
         shared |= {
             "variables": variables,
-            "states": tuple(renamed.get(s, s) for s in inner.states)
-            if set(inner.states) <= set(renamed)
-            else (),
-            "rates": tuple(renamed.get(s, s) for s in inner.rates)
-            if set(inner.rates) <= set(renamed)
-            else (),
+            "states": under_our_names(inner.states),
+            "rates": under_our_names(inner.rates),
             "output_dependencies": _dependencies(inner, port, renamed),
             # they are the FMU's own variables', not the port's
             "gives_directional_derivatives": False,

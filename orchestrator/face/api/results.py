@@ -129,11 +129,15 @@ class Modes(NoTruth, ask=".stability.stable, or len() for the number of modes in
         """The modes in the range over mode (as in `table`) and state; ``shape`` is the right eigenvector, complex."""
         table, share, of_both = self.table(), self.participation(), ["mode", "state"]
         shape = [[mode.shape.get(state, 0j) for state in share.index] for mode in self]
+
+        def figure(name: str, unit: str) -> tuple[str, list[Any], dict[str, str]]:
+            return "mode", [getattr(mode, name) for mode in self], {"units": unit}
+
         return xr.Dataset(
             {
-                "eigenvalue": ("mode", [mode.eigenvalue for mode in self], {"units": "rad/s"}),
-                "frequency": ("mode", [mode.frequency_hz for mode in self], {"units": "Hz"}),
-                "damping": ("mode", [mode.damping_percent for mode in self], {"units": "%"}),
+                "eigenvalue": figure("eigenvalue", "rad/s"),
+                "frequency": figure("frequency_hz", "Hz"),
+                "damping": figure("damping_percent", "%"),
                 "participation": (of_both, share.to_numpy().T),
                 "shape": (of_both, np.reshape(shape, share.T.shape)),
             },

@@ -79,13 +79,15 @@ class Cells:
             "left_out": max(0, len(self.rows) - fit),
             "rows": [asdict(side) for side in self.rows[:fit]],
             "columns": [asdict(side) for side in self.columns],
-            "cells": [
-                [c and {n: v for n, v in asdict(c).items() if v not in (None, "")} for c in row]
-                for row in self.cells[:fit]
-            ],
+            "cells": [list(map(_figures_of, row)) for row in self.cells[:fit]],
         }
         save_json(content, staging / CELLS)
         return staging / CELLS
+
+
+def _figures_of(cell: Cell | None) -> dict[str, Any] | None:
+    """The figures that a cell has, by name."""
+    return None if cell is None else {n: v for n, v in asdict(cell).items() if v not in (None, "")}
 
 
 def word_of(case: CaseDefinition, folder: Path) -> str:

@@ -150,7 +150,8 @@ def _sheet(path: Path) -> list[list[str]]:
     except Exception as error:
         remedy = "`pip install openpyxl` where that is missing, or save the sheet as CSV"
         raise InputError(f"{path}: it cannot be read as Excel: {error}; {remedy}") from error
-    return [["" if pd.isna(x) else str(x) for x in row] for row in cells.itertuples(index=False)]
+    texts = cells.astype(object).where(cells.notna(), "")
+    return [list(map(str, row)) for row in texts.itertuples(index=False)]
 
 
 def _text(content: bytes) -> str:

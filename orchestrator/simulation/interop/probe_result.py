@@ -150,9 +150,11 @@ def _table(path: Path) -> tuple[list[str], list[list[str]]]:
     separator = max(",;\t", key=filled[0].count)
     rows = [[entry.strip() for entry in row] for row in csv.reader(filled, delimiter=separator)]
     commas = separator != ","  # as the sign before decimals, where there is no point
-    return rows[0], [
-        [e.replace(",", ".") if commas and "." not in e else e for e in row] for row in rows[1:]
-    ]
+
+    def with_points(entry: str) -> str:
+        return entry.replace(",", ".") if commas and "." not in entry else entry
+
+    return rows[0], [list(map(with_points, row)) for row in rows[1:]]
 
 
 def _columns(path: Path, heads: list[str], named: dict[str, str]) -> dict[str, int]:

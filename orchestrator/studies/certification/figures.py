@@ -139,6 +139,14 @@ def damping_json(c: DampingCertificate) -> dict[str, Any]:
 def _point_json(c: Certificate, v: PointVerdict) -> dict[str, Any]:
     points = {name: c.results[name, v.X_L] for name in (WITHOUT, WITH)}
     having, without = points[WITH], points[WITHOUT].modes
+    lowered = [
+        {
+            "frequency_hz": m.frequency_hz,
+            "from_percent": m.before_percent,
+            "to_percent": m.damping_percent,
+        }
+        for m in v.lowered
+    ]
     return {
         "X_L": v.X_L,
         "accepted": v.accepted,
@@ -149,15 +157,8 @@ def _point_json(c: Certificate, v: PointVerdict) -> dict[str, Any]:
         "modes_beside": [mode_json(m) for m in v.neighbours],
         "modes_without": []
         if without is None
-        else [_figures(x) for x in without.eigenvalues.tolist()],
-        "lowered": [
-            {
-                "frequency_hz": m.frequency_hz,
-                "from_percent": m.before_percent,
-                "to_percent": m.damping_percent,
-            }
-            for m in v.lowered
-        ],
+        else list(map(_figures, without.eigenvalues.tolist())),
+        "lowered": lowered,
         "growth": {name: number(p.growth) for name, p in points.items()},
         "stability": {name: p.stability for name, p in points.items()},
         "residual": {name: number(p.residual) for name, p in points.items()},

@@ -221,6 +221,7 @@ def _modes(
     modes = [mode for mode in spectrum.modes if mode.is_oscillation]
     place = {complex(value): k for k, value in enumerate(spectrum.eigenvalues.tolist())}
     named = named_modes(case, model, modes).named
+    exists = index_of_rightmost(spectrum.eigenvalues) is not None
     return PointModes(
         Status.COMPUTED,
         warnings=warnings,
@@ -228,10 +229,8 @@ def _modes(
         values=spectrum.eigenvalues,
         swinging=tuple(place[mode.eigenvalue] for mode in modes),
         named={name: place[mode.eigenvalue] for name, mode in named.items()},
-        who=tuple(_who(mode) for mode in modes),
-        rightmost=""
-        if index_of_rightmost(spectrum.eigenvalues) is None
-        else _who(spectrum.rightmost),
+        who=tuple(map(_who, modes)),
+        rightmost=_who(spectrum.rightmost) if exists else "",
         loops=loops,
         clocks=model.clocks,
     )

@@ -318,17 +318,16 @@ def _doubts(blocks: Blocks, schedule: Schedule, model: LinearModel) -> tuple[str
 
 def step_choice_json(choice: StepChoice) -> dict[str, Any]:
     largest = {name: choice.largest(name) for name in choice.schedules}
+    critical = [
+        {"frequency_hz": z.imag / (2 * np.pi), "damping_percent": damping_percent(z)}
+        for z in choice.critical
+    ]
     return {
         "scenario": choice.prepared.name,
         "allowed": {"hertz": choice.allowed.hertz, "points": choice.allowed.points},
-        "critical": [
-            {"frequency_hz": z.imag / (2 * np.pi), "damping_percent": damping_percent(z)}
-            for z in choice.critical
-        ],
+        "critical": critical,
         "continuous_growth_rate": choice.growth,
-        "largest_step_s": {
-            name: None if best is None else best.step_size for name, best in largest.items()
-        },
+        "largest_step_s": {name: best and best.step_size for name, best in largest.items()},
         "left_out_s": list(choice.left_out),
         "trials": [
             {

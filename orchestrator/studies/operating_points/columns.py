@@ -1,7 +1,7 @@
 """Meaning of the columns of a file of operating points, for one scenario."""
 
 import fnmatch
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 from orchestrator.cases.flow.sharing import load_of
@@ -49,12 +49,16 @@ class Elements:
         units = {p.name: p.bus for p in network.ports if p.name in prepared.system.components}
         branches = [*(line.name for line in network.lines), *(x.name for x in network.transformers)]
         wanted = table.slack or prepared.source_slack or ""
+
+        def with_switch(names: Iterable[str]) -> tuple[str, ...]:
+            return tuple(name for name in names if f"{name}.connected" in switches)
+
         return cls(
             grid=table.grid,
             units=units,
-            lines=tuple(name for name in branches if f"{name}.connected" in switches),
+            lines=with_switch(branches),
             loads=tuple(load.name for load in network.loads),
-            shunts=tuple(x.name for x in network.shunts if f"{x.name}.connected" in switches),
+            shunts=with_switch(shunt.name for shunt in network.shunts),
             slack=units.get(wanted, wanted),
             balancing=prepared.power_flow.balancing if prepared.power_flow else (),
             step_ups=own_branches(network, units),

@@ -147,23 +147,7 @@ class RunComparison:
 
     def table(self) -> pd.DataFrame:
         """Largest deviation of each run, largest difference and its time [s], and the strongest oscillation of each."""
-        rows = [
-            {
-                "signal": c.expression,
-                "unit": c.unit,
-                "deviation_a": c.deviations[0],
-                "deviation_b": c.deviations[1],
-                "largest_difference": c.largest,
-                "at_s": c.at,
-                "rms": c.rms,
-                "frequency_hz_a": c.modes[0].frequency_hz if c.modes[0] else None,
-                "damping_percent_a": c.modes[0].damping_percent if c.modes[0] else None,
-                "frequency_hz_b": c.modes[1].frequency_hz if c.modes[1] else None,
-                "damping_percent_b": c.modes[1].damping_percent if c.modes[1] else None,
-            }
-            for c in self.signals
-        ]
-        return pd.DataFrame(rows).set_index("signal")
+        return pd.DataFrame(list(map(_row_of, self.signals))).set_index("signal")
 
     def as_json(self) -> list[dict[str, Any]]:
         """The same as ``gfor signal compare --json`` prints, as JSON's types."""
@@ -179,3 +163,20 @@ class RunComparison:
 
     def _repr_html_(self) -> str:
         return page(f"a: {self.labels[0]}; b: {self.labels[1]}", self.remarks, self.table())
+
+
+def _row_of(comparison: Comparison) -> dict[str, Any]:
+    """A signal's row in the table of two runs."""
+    row: dict[str, Any] = {
+        "signal": comparison.expression,
+        "unit": comparison.unit,
+        "deviation_a": comparison.deviations[0],
+        "deviation_b": comparison.deviations[1],
+        "largest_difference": comparison.largest,
+        "at_s": comparison.at,
+        "rms": comparison.rms,
+    }
+    for run, mode in zip("ab", comparison.modes, strict=True):
+        row[f"frequency_hz_{run}"] = mode and mode.frequency_hz
+        row[f"damping_percent_{run}"] = mode and mode.damping_percent
+    return row

@@ -1,7 +1,9 @@
 """Parts of a network that only DC lines join, or nothing: a study takes one of them."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
+from typing import TypeVar
 
 import numpy as np
 
@@ -10,6 +12,8 @@ from orchestrator.cases.form.remedies import with_slack
 from orchestrator.cases.networks.conversion import ImportedNetwork, bus_of
 from orchestrator.cases.networks.psse.devices import HeldDevice
 from orchestrator.core.errors import few
+
+Element = TypeVar("Element")
 
 _SHOWN = 3  # buses that are named; the others are counted
 
@@ -79,16 +83,24 @@ def _joins(devices: Sequence[HeldDevice], part: dict[str, int]) -> set[int]:
 
 
 def _without(network: ImportedNetwork, left: frozenset[str]) -> ImportedNetwork:
+    def outside(
+        elements: Iterable[Element], bus_of: Callable[[Element], str]
+    ) -> tuple[Element, ...]:
+        return tuple(x for x in elements if bus_of(x) not in left)
+
+    def at_others(by_bus: Mapping[str, Element]) -> dict[str, Element]:
+        return {bus: x for bus, x in by_bus.items() if bus not in left}
+
     return replace(
         network,
-        buses=tuple(bus for bus in network.buses if bus not in left),
-        lines=tuple(x for x in network.lines if x.from_bus not in left),
-        loads=tuple(x for x in network.loads if x.bus not in left),
-        shunts=tuple(x for x in network.shunts if x.bus not in left),
-        transformers=tuple(x for x in network.transformers if x.buses[0] not in left),
-        generation={bus: g for bus, g in network.generation.items() if bus not in left},
-        feeding={bus: p for bus, p in network.feeding.items() if bus not in left},
-        capacitors={bus: q for bus, q in network.capacitors.items() if bus not in left},
+        buses=outside(network.buses, str),
+        lines=outside(network.lines, attrgetter("from_bus")),
+        loads=outside(network.loads, attrgetter("bus")),
+        shunts=outside(network.shunts, attrgetter("bus")),
+        transformers=outside(network.transformers, lambda x: x.buses[0]),
+        generation=at_others(network.generation),
+        feeding=at_others(network.feeding),
+        capacitors=at_others(network.capacitors),
     )
 
 

@@ -352,17 +352,20 @@ def _kept_answers(page: Path) -> list[Answer]:
 
 
 def _answers(chapters: Sequence[Chapter]) -> list[Answer]:
-    return [
-        {
-            "question": one.question,
-            "source": "" if one.source.is_dir() else one.source.name,
-            "answer": one.answer + "".join(f"; not judged: {text}" for text in one.not_judged),
-            "given": given_in(one.origin),
-            "least": [mode.as_json() for mode in one.least],
-            "folder": (one.source if one.source.is_dir() else one.source.absolute().parent).name,
-        }
-        for one in chapters
-    ]
+    return list(map(_answer_of, chapters))
+
+
+def _answer_of(chapter: Chapter) -> Answer:
+    source, is_folder = chapter.source, chapter.source.is_dir()
+    not_judged = "".join(f"; not judged: {text}" for text in chapter.not_judged)
+    return {
+        "question": chapter.question,
+        "source": "" if is_folder else source.name,
+        "answer": chapter.answer + not_judged,
+        "given": given_in(chapter.origin),
+        "least": [mode.as_json() for mode in chapter.least],
+        "folder": (source if is_folder else source.absolute().parent).name,
+    }
 
 
 def _by_name(
