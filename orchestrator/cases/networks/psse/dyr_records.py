@@ -20,6 +20,7 @@ _OWN_MODELS = (
     "USRLOD",
 )  # a user's model of a machine or a load: its name is the first value
 
+_OF_BUS = "USRBUS"  # a user's model of a bus: its name stands where others have a machine
 
 NUMBERED = ("VTGTPAT", "VTGDCAT", "FRQTPAT", "FRQDCAT")
 """Relays whose records begin with a number of their own, where others have a bus."""
@@ -103,6 +104,8 @@ def _record(file: str, line: int, tokens: Sequence[str], names: int) -> DynamicR
             f"{' '.join(tokens[:4])!r} is no record; one is bus 'MODEL' id values … /",
         )
     name, machine, values = tokens[1].upper(), tokens[2].strip(), tuple(tokens[3:])
+    if name == _OF_BUS:
+        return DynamicRecord(file, line, int(tokens[0]), machine.upper(), "", values)
     if name in _OWN_MODELS and values:
         name, values = values[0].upper(), values[1:]
         if f"{name}T" in NUMBERED:

@@ -24,6 +24,7 @@ from orchestrator.core.options import Option
 _MATTER = {
     "load": "loads follow [network] load_model",
     "device": "what it feeds in the power flow is constant",
+    "plants": "the references of the units that it sets are constant",
     "unknown": "gfor does not know what it is",
 }
 """What stands for a model of no machine, by its kind; relays act on events only, and are not asked about."""
