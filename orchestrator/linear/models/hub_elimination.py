@@ -11,7 +11,7 @@ rows with few entries, lets the hub's rows fill almost everything.
 
 For a search the dense block may be divided (`divided_hub`): a solution is close then, and exact once it is refined."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -19,11 +19,16 @@ from typing import Protocol
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
-import scipy.sparse.linalg as spla
 from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Matrix, Vector
 from orchestrator.linear.models.divided_hub import DividedHub, divide, times
+from orchestrator.linear.models.separate_blocks import (
+    BlockFactors,
+    SeparateBlocks,
+    by_size,
+    separate_blocks,
+)
 
 BUSY = 100  # an equation with more unknowns than this belongs to the hub
 # models with a smaller hub keep the sparse factorisation of the whole, and with it their last
@@ -156,25 +161,25 @@ class HubEquations:
         self._take_in_columns(inside, schur)
         lu = scipy.linalg.lu_factor(schur, overwrite_a=True, check_finite=False)
         factors = HubFactors(self, sigma, blocks, inside, DenseHub(lu, self.into_hub[1]))
-        return factors if factors.left_over(self._trial(schur.dtype)) <= _ACCURATE else None
+        return factors if next(factors.left_over(self._trial(schur.dtype))) <= _ACCURATE else None
 
     def near_at(self, sigma: complex) -> "HubFactors | None":
         """The same by the divided hub, where there is one: `solve_exactly` is as accurate, `solve` is close."""
-        if self.divided is None:
-            return self.at(sigma)
-        found = self._through_blocks(complex(sigma))
-        if found is None:
+        factors = self.untried_at(sigma)
+        if factors is None:
+            return self.at(sigma) if self.divided is None else None
+        left = factors.left_over(self._trial(np.dtype(complex)))
+        is_near = next(left) <= _NEAR and next(left) <= _ACCURATE
+        return factors if is_near else self.at(sigma)
+
+    def untried_at(self, sigma: complex) -> "HubFactors | None":
+        """The same without a trial of its accuracy, for who proves the solutions; None if the hub is not divided."""
+        found = None if self.divided is None else self._through_blocks(complex(sigma))
+        if self.divided is None or found is None:
             return None
         blocks, inside = found
         hub = self.divided.at(sigma, inside[self.into_hub[0]])
-        factors = HubFactors(self, sigma, blocks, inside, hub)
-        trial = self._trial(np.dtype(complex))
-        rough = factors.left_over(trial) <= _NEAR
-        return (
-            factors
-            if rough and factors.left_over(trial, refined=True) <= _ACCURATE
-            else self.at(sigma)
-        )
+        return HubFactors(self, sigma, blocks, inside, hub)
 
     def _trial(self, kind: np.dtype) -> Vector:
         return np.random.default_rng(1).standard_normal(self.states).astype(kind)
@@ -189,14 +194,16 @@ class HubEquations:
         schur.real -= (turned.real @ dense.T).T
         schur.imag -= (turned.imag @ dense.T).T
 
-    def _through_blocks(self, sigma: complex) -> tuple[spla.SuperLU, sp.csc_array] | None:
+    @cached_property
+    def separate(self) -> SeparateBlocks:
+        return separate_blocks(self.quadrants[0], (self.rest < self.states).astype(float))
+
+    def _through_blocks(self, sigma: complex) -> tuple[BlockFactors, sp.csc_array] | None:
         """P − σ factorised, and P⁻¹·Q, solved for all columns of one colour at once."""
-        P, Q = self.quadrants[:2]
-        at_rest = sp.diags_array((self.rest < self.states).astype(float))
-        try:
-            blocks = spla.splu((P - sigma * at_rest).tocsc())
-        except RuntimeError:
+        blocks = self.separate.at(sigma)
+        if blocks is None:
             return None
+        P, Q = self.quadrants[:2]
         kind = np.result_type(P.dtype, sigma)
         colour, owner = self.colours
         _, block = self.blocks
@@ -217,7 +224,7 @@ class HubFactors:
 
     equations: HubEquations
     sigma: complex
-    blocks: spla.SuperLU
+    blocks: BlockFactors
     inside: sp.csc_array
     port: HubSolver
 
@@ -236,12 +243,17 @@ class HubFactors:
     def solve_adjoint_exactly(self, right: Vector) -> Vector:
         return self._states_of(right, self._exact_adjoint)
 
-    def left_over(self, right: Vector, *, refined: bool = False) -> float:
-        """Return what a solution leaves over of a right side, shape (n,), as a part of its largest element."""
+    def left_over(self, right: Vector) -> Iterator[float]:
+        """Yield what a solution leaves over of a right side, shape (n,), as a part of its largest element.
+
+        First that of `solve`, then that of `solve_exactly`, which goes on from there."""
         b = self._right(right[:, None])
-        rest = b - self._product((self._exact_solution if refined else self._solve)(b))
-        left = float(np.abs(rest).max() / np.abs(right).max())
-        return left if np.isfinite(left) else np.inf
+        found, rest = np.zeros_like(b), b
+        while True:
+            found = found + self._solve(rest)
+            rest = b - self._product(found)
+            left = float(np.abs(rest).max() / np.abs(right).max())
+            yield left if np.isfinite(left) else np.inf
 
     def _states_of(self, right: Vector, solve: Callable[[Vector], Vector]) -> Vector:
         columns = right if right.ndim == 2 else right[:, None]
@@ -281,7 +293,7 @@ class HubFactors:
 
     def _adjoint_product(self, x: Vector) -> Vector:
         e = self.equations
-        found = times(sp.csr_array(e.whole.T), x)
+        found = times(e.whole.T, x)
         found[: e.states] -= np.conj(self.sigma) * x[: e.states]
         return found
 
@@ -303,7 +315,9 @@ def hub_equations(
     busy = np.diff(whole.indptr) > BUSY
     if busy.sum() < LEAST_HUB:
         return None
-    return HubEquations(whole, n, np.flatnonzero(busy), np.flatnonzero(~busy))
+    rest = np.flatnonzero(~busy)
+    rest = rest[by_size(whole[rest][:, rest])]
+    return HubEquations(whole, n, np.flatnonzero(busy), rest)
 
 
 def _places_taken(G: sp.csr_array, K: sp.csr_array) -> Places:

@@ -185,6 +185,13 @@ class LinearModel:
             solve, solve_adjoint, solve_exactly=solve, solve_adjoint_exactly=solve_adjoint
         )
 
+    def solver_beside(self, sigma: complex) -> Callable[[Vector], Vector] | None:
+        """Return what solves (A − σI)ᴴ·x = b for many columns, close to an eigenvalue; None without a divided hub.
+
+        Nothing has tried how accurate it is: what comes of it is to be proved by `shifted` elsewhere."""
+        factors = self._hub.untried_at(sigma) if self._hub and self.is_searched_in_blocks else None
+        return factors.solve_adjoint if factors else None
+
     def _hub_at(self, sigma: complex) -> HubFactors | None:
         if self._hub is None:
             return None
