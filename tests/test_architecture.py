@@ -28,7 +28,7 @@ FLOORS = {
             "uncollected",
             "units",
         ),
-        ("options",),
+        ("assignment", "options"),
         ("errors",),
         ("asked", "attributes", "foreign_files", "question_kinds"),
         ("safe_files", "toml_files", "truth"),

@@ -12,11 +12,13 @@ import scipy.sparse.linalg as spla
 from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Vector
+from orchestrator.core.assignment import least_assignment
 from orchestrator.core.errors import AnalysisError
 from orchestrator.core.threads import one_thread
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra import modes as spectra
 from orchestrator.linear.spectra.block_arnoldi import MOST, TOLERANCE, BlockArnoldi
+from orchestrator.linear.spectra.left_vectors import left_vectors
 from orchestrator.linear.spectra.region_cells import RegionCell
 
 DENSE = 200  # up to this number of states, the full spectrum is cheaper
@@ -313,30 +315,52 @@ class Search:
         self, blocks: BlockArnoldi, chosen: list[int]
     ) -> list[tuple[complex, Vector, Vector]]:
         """The same, from the space of both sides' vectors: its eigenvalues have the square of their accuracy."""
-        from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - half a second to import
-
         wanted = blocks.values[chosen]
+        with one_thread():
+            right = blocks.vectors(chosen)
+            left = left_vectors(self._model, self.sigma, wanted)
+            found = None if left is None else self._both_sides(wanted, left, right)
+            if found is None or not self._are_left(*found[:2]):
+                found = self._both_sides(wanted, self._left_by_search(wanted), right)
+        if found is None:
+            raise self._not_converging
+        nu, left, right = found
+        values = self._to_lambda(nu)
+        return [(complex(values[k]), left[:, k], right[:, k]) for k in range(len(chosen))]
+
+    def _left_by_search(self, wanted: NDArray[np.complex128]) -> Vector:
+        """Left eigenvectors of some ν by a search in the adjoint equations."""
         adjoint = BlockArnoldi(self._solver.solve_adjoint, len(self._model.names), 2 * MOST)
         if not _grow(adjoint, lambda found: _partners(found, wanted) is not None):
             raise self._not_converging
-        with one_thread():
-            left, right = adjoint.vectors(_partners(adjoint, wanted) or ()), blocks.vectors(chosen)
-            moved = self._solver.solve_exactly(right)
-            nu, of_left, of_right = scipy.linalg.eig(
-                left.conj().T @ moved, left.conj().T @ right, left=True
-            )
-            left, right, moved = left @ of_left, right @ of_right, moved @ of_right
-        order = linear_sum_assignment(np.abs(wanted[:, None] - nu[None, :]))[1]
+        return adjoint.vectors(_partners(adjoint, wanted) or ())
+
+    def _both_sides(
+        self, wanted: NDArray[np.complex128], left: Vector, right: Vector
+    ) -> tuple[NDArray[np.complex128], Vector, Vector] | None:
+        """Return ν, left and right eigenvectors in the space of some; None where they are not those wanted."""
+        moved = self._solver.solve_exactly(right)
+        nu, of_left, of_right = scipy.linalg.eig(
+            left.conj().T @ moved, left.conj().T @ right, left=True
+        )
+        if not np.isfinite(nu).all():
+            return None
+        _, order = least_assignment(np.abs(wanted[:, None] - nu[None, :]))
+        nu, of_left, of_right = nu[order], of_left[:, order], of_right[:, order]
+        left, right, moved = left @ of_left, right @ of_right, moved @ of_right
         rest = np.linalg.norm(moved - right * nu, axis=0) / (
             np.abs(nu) * np.linalg.norm(right, axis=0)
         )
-        moves = np.abs(nu[order] - wanted) / np.abs(wanted)
-        if not (
-            np.concatenate([rest, moves]) <= _SAME
-        ).all():  # nor is it where one is not a number
-            raise self._not_converging
-        values = self._to_lambda(nu)
-        return [(complex(values[k]), left[:, k], right[:, k]) for k in order.tolist()]
+        moves = np.abs(nu - wanted) / np.abs(wanted)
+        # nor is it where one is not a number
+        is_same = bool((np.concatenate([rest, moves]) <= _SAME).all())
+        return (nu, left, right) if is_same else None
+
+    def _are_left(self, nu: NDArray[np.complex128], left: Vector) -> bool:
+        """Return whether the adjoint equations around σ turn no left eigenvector."""
+        rest = self._solver.solve_adjoint_exactly(left) - left * nu.conj()
+        sizes = np.abs(nu) * np.linalg.norm(left, axis=0)
+        return bool((np.linalg.norm(rest, axis=0) <= TOLERANCE * sizes).all())
 
     def _farthest(self, radius: float) -> float:
         """Distance from ``sigma`` of the farthest point of the circle around ``centre``."""
@@ -386,13 +410,11 @@ def _grow(blocks: BlockArnoldi, enough: Callable[[BlockArnoldi], bool]) -> bool:
 
 def _partners(blocks: BlockArnoldi, wanted: NDArray[np.complex128]) -> list[int] | None:
     """Places of the settled values of the adjoint equations that are those wanted, one for each; None if one lacks."""
-    from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - half a second to import
-
     settled = np.flatnonzero(blocks.accuracy <= TOLERANCE)
     if len(settled) < len(wanted):
         return None
     apart = (
         np.abs(wanted[:, None] - blocks.values[settled].conj()[None, :]) / np.abs(wanted)[:, None]
     )
-    rows, columns = linear_sum_assignment(np.minimum(apart, 1.0))
+    rows, columns = least_assignment(np.minimum(apart, 1.0))
     return settled[columns].tolist() if bool((apart[rows, columns] <= _SAME).all()) else None

@@ -7,7 +7,9 @@ import scipy.sparse as sp
 from orchestrator.linear.models import divided_hub, hub_elimination, linear_model
 from orchestrator.linear.models.hub_elimination import DenseHub
 from orchestrator.linear.models.linear_model import LinearModel
-from orchestrator.linear.spectra.critical_modes import find_critical_modes
+from orchestrator.linear.spectra import critical_modes, left_vectors
+from orchestrator.linear.spectra.block_arnoldi import BlockArnoldi
+from orchestrator.linear.spectra.critical_modes import Search, find_critical_modes
 from orchestrator.linear.spectra.modes import find_modes
 from tests.linear.models.test_hub_elimination import STATES, UNITS, system
 
@@ -104,3 +106,52 @@ def test_ties_of_weight_that_are_left_out_are_noticed(monkeypatch):
     assert isinstance(factors.port, DenseHub)
     b = np.ones((STATES, 1), dtype=complex)
     assert np.allclose(model.A @ factors.solve(b) - SIGMA * factors.solve(b), b, atol=1e-9)
+
+
+def searches(monkeypatch):
+    """Collect what is searched in blocks."""
+    begun = []
+
+    class Counted(BlockArnoldi):
+        def __init__(self, *given):
+            begun.append(given)
+            super().__init__(*given)
+
+    monkeypatch.setattr(critical_modes, "BlockArnoldi", Counted)
+    return begun
+
+
+def assert_left(model, pairs):
+    assert pairs
+    for value, left, right in pairs:
+        assert np.abs(model.A.T @ left.conj() - value * left.conj()).max() < 1e-7 * abs(left).max()
+        assert np.abs(model.A @ right - value * right).max() < 1e-6 * abs(right).max()
+
+
+def test_few_left_vectors_come_from_beside_their_eigenvalues_without_a_second_search(monkeypatch):
+    begun = searches(monkeypatch)
+    model = along_a_line()
+    search = Search(model, 2j * np.pi * 0.75)
+    values = search.reaching(0.6)
+    few = np.argsort(np.abs(values - search.centre))[:4].tolist()
+    assert_left(model, search.pairs(few))
+    assert len(begun) == 1
+    monkeypatch.setattr(left_vectors, "MOST_POINTS", 1)
+    assert_left(model, search.pairs(few))
+    assert len(begun) == 2
+
+
+@pytest.mark.parametrize("wrong", ["random", "others"])
+def test_left_vectors_that_are_none_or_of_other_eigenvalues_are_noticed(wrong, monkeypatch):
+    def planted(model, sigma, nu):
+        if wrong == "random":
+            return np.random.default_rng(0).standard_normal((STATES, len(nu))) + 0j
+        return left_vectors.left_vectors(model, sigma, 1 / (1 / nu + 40.0))
+
+    begun = searches(monkeypatch)
+    monkeypatch.setattr(critical_modes, "left_vectors", planted)
+    model = along_a_line()
+    search = Search(model, 2j * np.pi * 0.75)
+    search.reaching(0.6)
+    assert_left(model, search.pairs([0, 1]))
+    assert len(begun) == 2
