@@ -173,3 +173,15 @@ class RealBatch:
         if self.names:
             with calls:
                 self.component.check(self.component.set_real(*self.arguments), "fmi2SetReal")
+
+    def write_one(self, place: int) -> None:
+        """Write one of the values alone, by its place in ``names``."""
+        pointer, references, _, values = self.arguments
+        only = (
+            pointer,
+            references + place * ctypes.sizeof(ctypes.c_uint),
+            1,
+            values + place * self.values.itemsize,
+        )
+        with calls:
+            self.component.check(self.component.set_real(*only), "fmi2SetReal")

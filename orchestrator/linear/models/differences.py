@@ -56,7 +56,8 @@ class PerturbedStep:
         ``size``: of the perturbation, relative to max(1, |value|); ``rates`` are read before the step; ``unstepped``:
         those of ``varied`` after which no step is done; the caller gives their columns of d(x⁺)."""
         component, names = self.component, self.names
-        z_0 = RealBatch(component, names).read().copy()
+        perturbed = RealBatch(component, names)
+        z_0 = perturbed.read().copy()
         after, outputs, slopes = (
             RealBatch(component, group) for group in (self.states, self.exits, rates)
         )
@@ -71,12 +72,12 @@ class PerturbedStep:
             after_0 = after.read().copy()
             component.restore_state(saved)
             for k, place in enumerate(varied):
-                perturbed, value = RealBatch(component, [names[place]]), z_0[place]
+                value = z_0[place]
                 step = size * max(1.0, abs(value))
                 signs = _allowed_signs(component, names[place], value, step)
                 for sign in signs:
-                    perturbed.values[0] = value + sign * step
-                    perturbed.write()
+                    perturbed.values[place] = value + sign * step
+                    perturbed.write_one(place)
                     for batch, column in zip((outputs, slopes), columns[1:], strict=True):
                         column[k] += sign * batch.read()
                     if place not in unstepped:

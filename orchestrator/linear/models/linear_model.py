@@ -251,13 +251,7 @@ class Equations:
         rows, columns, values = (
             np.concatenate(part) for part in zip(*self._parts[name], strict=True)
         )
-        shape = self._shapes[name]
-        order = np.lexsort((columns, rows))
-        rows, columns, values = rows[order], columns[order], values[order]
-        if np.any((rows[1:] == rows[:-1]) & (columns[1:] == columns[:-1])):
-            return sp.coo_array((values, (rows, columns)), shape=shape).tocsr()
-        begins = np.zeros(shape[0] + 1, dtype=np.int32)
-        np.cumsum(np.bincount(rows, minlength=shape[0]), out=begins[1:])
-        found = sp.csr_array((values, columns.astype(np.int32), begins), shape=shape)
-        found.has_canonical_format = True
+        places = rows.astype(np.int32), columns.astype(np.int32)
+        found = sp.csr_array(sp.coo_array((values, places), shape=self._shapes[name]))
+        found.sum_duplicates()
         return found

@@ -64,6 +64,14 @@ def test_a_batch_reads_and_writes_in_the_order_of_its_names(component):
     assert RealBatch(component, ("v_re",)).read().tolist() == [0.75]
 
 
+def test_one_value_of_a_batch_is_written_alone(component):
+    initialise(component)
+    batch = RealBatch(component, ("v_im", "v_re"))
+    batch.values[:] = [np.nan, 0.75]
+    batch.write_one(1)
+    assert component.get(["v_im", "v_re"]) == {"v_im": 0.0, "v_re": 0.75}
+
+
 def test_a_batch_works_on_the_callers_own_array(component):
     initialise(component)
     shared = np.full(6, 9.0)
