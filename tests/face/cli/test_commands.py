@@ -303,13 +303,13 @@ def test_build_writes_an_fmu_that_info_reads(gfor, tmp_path):
 
 def test_build_of_an_unknown_model_builds_nothing(refused, tmp_path):
     err = refused("fmu", "build", "gfor", "gfro", "--dest", tmp_path / "new")
-    assert "there is no model 'gfro'; there are: csvgn1_phasor, dera1_phasor, " in err
+    assert "there is no model 'gfro'; there are: cstatt_phasor, csvgn1_phasor, " in err
     assert not (tmp_path / "new").exists()
 
 
 def test_build_without_a_name_lists_the_models_and_builds_nothing(refused, tmp_path):
     err = refused("fmu", "build", "--native", "--dest", tmp_path / "new")
-    assert "no model is named, and nothing is built; name one of csvgn1_phasor, dera1_phasor" in err
+    assert "no model is named, and nothing is built; name one of cstatt_phasor, csvgn1_phasor" in err
     assert "--all" in err
     assert not (tmp_path / "new").exists()
     assert "leave it out, or the name gfor" in refused("fmu", "build", "gfor", "--all")
