@@ -309,7 +309,9 @@ def test_build_of_an_unknown_model_builds_nothing(refused, tmp_path):
 
 def test_build_without_a_name_lists_the_models_and_builds_nothing(refused, tmp_path):
     err = refused("fmu", "build", "--native", "--dest", tmp_path / "new")
-    assert "no model is named, and nothing is built; name one of cstatt_phasor, csvgn1_phasor" in err
+    assert (
+        "no model is named, and nothing is built; name one of cstatt_phasor, csvgn1_phasor" in err
+    )
     assert "--all" in err
     assert not (tmp_path / "new").exists()
     assert "leave it out, or the name gfor" in refused("fmu", "build", "gfor", "--all")

@@ -72,7 +72,7 @@ def _network(
     for line, text in net.dropped.items():
         net.changes.note(line, text)
     read_buses(net)
-    merge_buses(net)
+    merge_buses(net, modelled)
     read_loads(net)
     read_shunts(net, modelled)
     read_lines(net)

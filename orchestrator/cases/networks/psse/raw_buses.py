@@ -1,6 +1,6 @@
 """Buses of a PSS/E RAW file, those that a line without impedance joins, and those with nothing at them."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from orchestrator.cases.networks.psse.raw_network import Machine
 from orchestrator.cases.networks.psse.raw_tables import (
@@ -61,8 +61,11 @@ def read_buses(net: RawTables) -> None:
         net.titles[number] = record.text(1).strip()
 
 
-def merge_buses(net: RawTables) -> None:
-    """Make one bus of those that a line without impedance joins."""
+def merge_buses(net: RawTables, modelled: Collection[tuple[int, str]] = ()) -> None:
+    """Make one bus of those that a line without impedance joins.
+
+    ``modelled``: bus and identifier of records of compensators; such a bus stands for the others, as a machine's
+    does."""
     least = threshold(net.raw)
     zero = [
         *(
@@ -87,7 +90,7 @@ def merge_buses(net: RawTables) -> None:
         record.whole(0, "the bus' number")
         for record in net.raw.of("generator")
         if record.whole(status, "STAT", 1)
-    }
+    } | {bus for bus, _ in modelled}
     kinds = {bus: int(row[1]) for bus, row in net.rows.items()}
     net.same, gone, kept = merged_buses(joins, kinds, held)
     for bus, standing in net.same.items():

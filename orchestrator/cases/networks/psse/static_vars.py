@@ -74,7 +74,7 @@ def units_of_shunts(net: RawTables, modelled: Modelled) -> Iterator[Machine]:
     It holds the voltage of the file's solution, so that it feeds BINIT where that is solved."""
     for shunt in switched_shunts(net):
         place = net.own_bus(shunt.record)
-        if (place, shunt.name) not in modelled:
+        if (place, shunt.name) not in modelled or net.is_out(shunt.bus):
             continue
         v = net.magnitudes[shunt.bus]
         least, most = min(shunt.least, shunt.initial), max(shunt.most, shunt.initial)

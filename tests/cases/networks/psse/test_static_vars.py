@@ -158,6 +158,25 @@ def test_a_switched_shunt_with_a_model_is_a_unit_and_no_shunt(tmp_path, revision
     assert [x.use.value for x in data.records if x.kind == "switched shunt"] == ["used"]
 
 
+def test_its_bus_stands_for_one_that_a_line_without_impedance_joins(tmp_path):
+    """A merged bus keeps the number that the record names, even if its partner comes first."""
+    with_shunt(tmp_path)
+    text = (tmp_path / "grid.raw").read_text()
+    bus = "8,'BUS 8     ',230.0,1,1,1,1,1.0,0.0,1.1,0.9,1.1,0.9"
+    line = "8,9,'1 ',"
+    assert bus in text
+    assert line in text
+    text = text.replace(bus, f"{bus}\n{bus.replace('8,', '10,', 1).replace('BUS 8 ', 'BUS 10')}")
+    joined = "10,8,'1 ',0.0,0.00001,0,0,0,0,0,0,0,0,1,1,0,1,1"
+    (tmp_path / "grid.raw").write_text(text.replace(line, f"{joined}\n{line}", 1))
+    data = network_data(NetworkTable(raw="grid.raw"), tmp_path, None, frozenset({(8, "shunt 1")}))
+    assert "bus_8" in data.buses
+    assert "bus_10" not in data.buses
+    assert 8 in {machine.bus for machine in data.machines}
+    other = network_data(NetworkTable(raw="grid.raw"), tmp_path, None, frozenset({(10, "shunt 1")}))
+    assert "bus_10" in other.buses
+
+
 @pytest.mark.parametrize("revision", [33, 35])
 def test_a_solved_file_gives_the_system_what_its_shunt_feeds(gfor, tmp_path, revision):
     """The voltage of the power flow with the shunt held at BINIT, as the file's: the system then feeds BINIT·V²."""
