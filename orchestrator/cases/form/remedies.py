@@ -2,32 +2,36 @@
 
 from collections.abc import Sequence
 
+from orchestrator.core.options import Option, command
+
 
 def without_kinds(kinds: Sequence[str]) -> str:
     """Return ``leave_out = ['gne'] in [network] (`gfor new --leave-out "gne"`)``, without the devices of some kinds."""
-    options = " ".join(f'--leave-out "{kind}"' for kind in kinds)
-    return f"leave_out = {_toml_list(kinds)} in [network] (`gfor new {options}`)"
+    options = [(Option.LEAVE_OUT, f'"{kind}"') for kind in kinds]
+    return f"leave_out = {_toml_list(kinds)} in [network] (" + command("new", *options) + ")"
 
 
 def without_models(names: Sequence[str]) -> str:
     """Return the same for records of dynamics data, by the names of their models."""
-    options = " ".join(f"--dyr-leave-out {name}" for name in names)
-    return f"dyr_leave_out = {_toml_list(names)} in [units] (`gfor new {options}`)"
+    options = [(Option.DYR_LEAVE_OUT, name) for name in names]
+    return f"dyr_leave_out = {_toml_list(names)} in [units] (" + command("new", *options) + ")"
 
 
 def replacement_of(unit: str) -> str:
     """Return what puts a converter of the case in the place of a machine, by the label of its unit."""
-    return f"replace = {_toml_list([unit])} in [units] (`gfor new --replace {unit}`)"
+    typed = command("new", (Option.REPLACE, unit))
+    return f"replace = {_toml_list([unit])} in [units] (" + typed + ")"
 
 
 def with_frequency(hertz: float) -> str:
     """Return what gives a network's rated frequency [Hz]."""
-    return f'frequency = "{hertz:g} Hz" in [network] (`gfor new --frequency "{hertz:g} Hz"`)'
+    typed = command("new", (Option.FREQUENCY, f'"{hertz:g} Hz"'))
+    return f'frequency = "{hertz:g} Hz" in [network] (' + typed + ")"
 
 
 def with_slack(name: str) -> str:
     """Return what names the unit or bus that feeds what is left."""
-    return f'slack = "{name}" in [power_flow] (`gfor new --slack {name}`)'
+    return f'slack = "{name}" in [power_flow] (' + command("new", (Option.SLACK, name)) + ")"
 
 
 APPROXIMATING = "dyr_approximate = true in [units] (`gfor new --dyr-approximate`)"

@@ -6,6 +6,7 @@ from enum import StrEnum
 import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers, Vector
+from orchestrator.core.options import Option
 from orchestrator.studies.black_box.fitting import bands_of
 from orchestrator.studies.immittance.loop import NO_MODES, CutLoop, LoopPath, common_range, nodes_of
 from orchestrator.studies.immittance.margins import (
@@ -285,8 +286,10 @@ def _frames(loop: CutLoop, nodes: Numbers, count: int) -> list[str]:
         turned = replace(loop, device=replace(device, values=T @ device.values @ T.T))
         if encirclements(turned.path(nodes), exact=loop.is_exact)[0] != count:
             return [
-                "the verdict depends on the angle between the frames of the two scans, which neither states: give it "
-                f"by --angle, or the files _angles.txt (turned by {np.rad2deg(angle):.0f}° it would be another)"
+                "the verdict depends on the angle between the frames of the two scans, which neither states: give "
+                "it by "
+                + Option.ANGLE
+                + f", or the files _angles.txt (turned by {np.rad2deg(angle):.0f}° it would be another)"
             ]
     return []
 

@@ -10,6 +10,7 @@ from rich.console import RenderableType
 from rich.markup import escape
 
 from orchestrator.core.late import pd
+from orchestrator.core.spelling import spelled
 from orchestrator.core.truth import NoTruth
 from orchestrator.output.report.notebook import page
 from orchestrator.output.report.tables import VerdictSentence, make_table
@@ -54,7 +55,7 @@ class Nyquist(NoTruth, ask=".verdict"):
     @property
     def reasons(self) -> tuple[str, ...]:
         """Why the verdict is not known."""
-        return self.result.judgement.reasons
+        return tuple(map(spelled, self.result.judgement.reasons))
 
     def retune(
         self,

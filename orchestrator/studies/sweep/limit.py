@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.core.errors import ErrorKind, few
+from orchestrator.core.options import Option
 from orchestrator.linear.spectra.modes import Mode, damping_percent, make_mode
 from orchestrator.studies.sweep.point import PointRecord
 
@@ -194,7 +195,7 @@ class ParameterLimit:
     def remarks(self) -> list[str]:
         return [
             f"{self.title}: {len(self.tried)} values were tried before the bisection; a narrower range between two of "
-            "them that does not hold would not be seen: COUNT in --vary tries more"
+            "them that does not hold would not be seen: COUNT in " + Option.VARY + " tries more"
         ]
 
     def _value(self, value: float | None) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 from orchestrator.core.errors import InputError
 from orchestrator.core.late import pd, xr
 from orchestrator.core.safe_files import made_folder
+from orchestrator.core.spelling import spelled
 from orchestrator.core.truth import NoTruth
 from orchestrator.output.report.explorer_cells import CELLS, Cell, CellLine, Cells
 from orchestrator.output.report.notebook import Axes, axes_or_new, page
@@ -48,7 +49,7 @@ class ParameterSweep(NoTruth):
         """Return what failed, was refined or was not recognised, one sentence each."""
         from orchestrator.studies.sweep import tables  # noqa: PLC0415 - imports Matplotlib, a second
 
-        return tables.remarks(self.samples)
+        return list(map(spelled, tables.remarks(self.samples)))
 
     @property
     def dataset(self) -> xr.Dataset:

@@ -11,6 +11,7 @@ from copy import deepcopy
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
+from types import SimpleNamespace
 
 import pytest
 
@@ -126,6 +127,14 @@ def test_texts_keep_their_options_as_they_are_joined_copied_and_kept():
         assert (same, spelled(same)) == (text, "use workers, or `modes(critical=True)`")
     assert spelled(joined("; ", ["a", Option.OUT, text])).startswith("a; folder; use workers")
     assert joined("; ", []) == ""
+
+
+def test_reasons_and_remarks_of_a_study_name_keywords_to_python():
+    text = "give it by " + Option.RANGE
+    reasons = SimpleNamespace(judgement=SimpleNamespace(reasons=(text,)))
+    assert Nyquist(reasons, None, None).reasons == ("give it by frequencies",)
+    with as_options():
+        assert Nyquist(reasons, None, None).reasons == (text,)
 
 
 def test_what_was_given_as_tables_is_named_as_it_was_given():
