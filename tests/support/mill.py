@@ -34,18 +34,19 @@ def mill_case(
     units: str = "",
     raw: str = RAW,
     replace: Sequence[str] = (),
+    machines: str = MACHINES,
 ) -> Path:
     """Write the case, whose scenario ``tried`` has the events, and return its path.
 
     ``records``: of dynamics data, without their ends; ``units``: lines for the table ``[units]``; ``replace``: units
-    whose machines converters replace."""
+    whose machines converters replace; ``machines``: records of both units."""
     (folder / "mill.raw").write_text(raw)
-    (folder / "mill.dyr").write_text(MACHINES + "".join(f"{text} /\n" for text in records))
+    (folder / "mill.dyr").write_text(machines + "".join(f"{text} /\n" for text in records))
     out = folder / "case.toml"
     files = (folder / "mill.raw", folder / "mill.dyr")
     text = write_case(WantedCase(files, out, models="phasor", replace=tuple(replace))).text
     text = text.replace('dyr = "mill.dyr"', f'{units}\ndyr = "mill.dyr"')
-    name = "gfor2" if "2" in replace else "sg2"
+    name = "gfor2" if "2" in replace or machines != MACHINES else "sg2"
     text = text.replace('"grid.line_*.p"', f'"grid.line_*.p", "grid.{name}.p"')
     tables = "".join(
         "[[scenarios.tried.events]]\n" + "".join(f"{k} = {v!r}\n" for k, v in e.items())

@@ -15,6 +15,7 @@ from orchestrator.devices.binding.misfits import Misfit
 from orchestrator.simulation.watch.confirmation import KnownModes
 from orchestrator.simulation.watch.finding import MISFIT, UNSTABLE, Finding, Kind
 from orchestrator.simulation.watch.limits import above_declared, active_limits, limit_signals
+from orchestrator.simulation.watch.own_trips import own_trip_signals, own_trips
 from orchestrator.simulation.watch.relay_trips import finding_of
 from orchestrator.simulation.watch.response import (
     enough_looks,
@@ -136,6 +137,7 @@ class Watch:
                 *limit_signals(prepared.system),
                 *angle_signals(prepared.system),
                 *speed_signals(prepared.system),
+                *own_trip_signals(prepared.system),
             ]
         )
         self._looks_at_records = every % prepared.record_every == 0 and not prepared.record_filtered
@@ -204,6 +206,7 @@ def judge_run(
     if happened and happened[0] > 0:
         parts.insert(0, Stretch(0.0, happened[0]))
     found = [
+        *own_trips(seen, system, settings),
         *undisturbed,
         *above_declared(seen, system),
         *active_limits(seen, system, settings),

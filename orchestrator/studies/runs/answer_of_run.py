@@ -10,6 +10,8 @@ from orchestrator.core.options import Option
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.output.report.tables import short
 from orchestrator.simulation.watch.confirmation import PERIODS
+from orchestrator.simulation.watch.finding import TRIP
+from orchestrator.simulation.watch.own_trips import OWN_TRIPS
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.runs.after_events import lasting_changes, same_mode
 from orchestrator.studies.runs.answer import LONGEST_REMARK, ScenarioAnswer
@@ -53,11 +55,20 @@ def of_run(result: RunResult) -> ScenarioAnswer:
 
 def _with_trips(answer: ScenarioAnswer, result: RunResult) -> ScenarioAnswer:
     """Return the answer with who was tripped, before all else that it remarks."""
-    if not result.trips:
+    by_relays = [f"{trip.relay.of} at {trip.time:.4g} s" for trip in result.trips]
+    inside = [
+        f"{one.component} at {one.time:.4g} s"
+        for one in result.findings
+        if one.kind == TRIP and one.variable in OWN_TRIPS
+    ]
+    told = [
+        f"{who} {few(list(dict.fromkeys(names)), _TRIPS_NAMED)}"
+        for who, names in (("relays trip", by_relays), ("own trips of", inside))
+        if names
+    ]
+    if not told:
         return answer
-    told = [f"{trip.relay.of} at {trip.time:.4g} s" for trip in result.trips]
-    remark = f"relays trip {few(list(dict.fromkeys(told)), _TRIPS_NAMED)}; {answer.remark}"
-    return replace(answer, remark=short(remark, LONGEST_REMARK))
+    return replace(answer, remark=short("; ".join([*told, answer.remark]), LONGEST_REMARK))
 
 
 def _of_run(result: RunResult) -> ScenarioAnswer:

@@ -8,7 +8,8 @@ from orchestrator.cases.flow.sharing import SharingRule
 from orchestrator.cases.form.parameter_files import ParameterFile
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import CosimError, NotTakenUpError
-from orchestrator.simulation.watch.finding import Finding, Kind
+from orchestrator.simulation.watch.finding import TRIP, Finding, Kind
+from orchestrator.simulation.watch.own_trips import OWN_TRIPS
 from orchestrator.simulation.watch.relay_trips import finding_of, relays_in
 from orchestrator.simulation.watch.watch import Watch
 from orchestrator.studies.modes.modes import running
@@ -25,6 +26,7 @@ from orchestrator.systems.coupling.events import (
     ShuntSwitching,
     UnitSwitching,
 )
+from orchestrator.systems.coupling.relays import Trip
 
 BEGIN = 1.0  # time at which the outage, or the fault before it, happens [s]
 
@@ -133,16 +135,19 @@ def _outage_run(prepared: PreparedScenario) -> OutageRun:
         late = master.late_starts
     trips = relays.trips
     findings = watch.findings(failure, late, trips=trips)
-    return OutageRun(
-        prepared.stop_time,
-        tuple(
-            RelayTrip(
-                trip.relay.of, trip.relay.record, trip.time, trip.seen, finding_of(trip).message
-            )
-            for trip in trips
-        ),
-        tuple(map(_gone_wrong, (one for one in findings if one.kind in DECIDING))),
-    )
+    told = [_by_relay(trip) for trip in trips]
+    told += [_inside(one) for one in findings if one.kind == TRIP and one.variable in OWN_TRIPS]
+    wrong = [_gone_wrong(one) for one in findings if one.kind in DECIDING]
+    return OutageRun(prepared.stop_time, tuple(told), tuple(wrong))
+
+
+def _by_relay(trip: Trip) -> RelayTrip:
+    message = finding_of(trip).message
+    return RelayTrip(trip.relay.of, trip.relay.record, trip.time, trip.seen, message)
+
+
+def _inside(one: Finding) -> RelayTrip:
+    return RelayTrip(one.component, "", one.time, one.figures["power_mw"], one.message)
 
 
 def _gone_wrong(finding: Finding) -> WentWrong:

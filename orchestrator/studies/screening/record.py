@@ -23,8 +23,9 @@ class WantedRuns:
 class RelayTrip:
     """A relay that acted in the run of an outage.
 
-    ``of``: the unit, load or bus that it protects; ``time``: when its breaker opened [s]; ``seen``: voltage [pu] or
-    frequency [Hz] when it tripped."""
+    ``of``: the unit, load or bus that it protects; ``record``: its record, "" of a trip inside a model; ``time``: when
+    its breaker opened [s]; ``seen``: voltage [pu] or frequency [Hz] when it tripped, inside a model the power that
+    goes off [MW]."""
 
     of: str
     record: str

@@ -36,7 +36,7 @@ def runs_sentence(summary: Summary) -> str:
         return ""
     told = []
     for items, what, of in (
-        (summary.tripping, "relays trip", _trips_of),
+        (summary.tripping, "relays or models trip", _trips_of),
         (summary.gone_wrong, "the system does not hold", _wrong_of),
     ):
         if items:
@@ -44,7 +44,7 @@ def runs_sentence(summary: Summary) -> str:
             assert first.record.run is not None
             at = f"{first.point.name}, {first.outage.name}"
             told.append(f"in {len(items)} of {total} {what}, first {at}: {of(first.record.run)}")
-    return f"runs of the outages: {'; '.join(told) or f'in none of {total} a relay trips'}"
+    return f"runs of the outages: {'; '.join(told) or f'in none of {total} anything trips'}"
 
 
 def runs_table(summary: Summary, most: int = 12) -> ColumnTable[ScreenedItem] | None:
@@ -57,7 +57,7 @@ def runs_table(summary: Summary, most: int = 12) -> ColumnTable[ScreenedItem] | 
         (
             Column("Point", lambda item: item.point.name),
             Column("Outage", lambda item: item.outage.name),
-            Column("Relays trip", _trips, text=True),
+            Column("Who trips", _trips, text=True),
             Column("Does not hold", _wrong, text=True),
         ),
         found,

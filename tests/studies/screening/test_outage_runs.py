@@ -59,7 +59,7 @@ def test_trips_leave_the_verdict_open_and_all_outputs_name_them(screened):
     assert found.stable is None
     assert STUDY.code(found, True) == 1
     assert "what relays leave at 1 of them is not judged" in found.verdict
-    assert "in 1 of 2 relays trip, first case, line_1_2" in found.verdict
+    assert "in 1 of 2 relays or models trip, first case, line_1_2" in found.verdict
     told = json.loads(json.dumps(found.as_json()))["runs"]
     assert [(run["outage"], len(run["trips"])) for run in told] == [("line_1_2", 1), ("sg2", 0)]
     (in_json,) = told[0]["trips"]
