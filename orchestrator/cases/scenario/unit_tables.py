@@ -45,6 +45,7 @@ from orchestrator.cases.questions.plausibility import question
 from orchestrator.cases.scenario.motor_components import motor_components, take_motors
 from orchestrator.cases.scenario.protection_relays import take_relays
 from orchestrator.cases.scenario.recorded_loads import take_frequency, take_laws
+from orchestrator.cases.scenario.removed_parts import without_removed_parts
 from orchestrator.core.errors import InputError, Problem, few
 
 UNIT_KINDS = ("sg", "gfor")  # first parts of the names of a unit's generator and converter
@@ -302,6 +303,7 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> tuple[list[UnitRow], Sequen
     motors = _account(draft, table, records, ours)
     rows = with_choices(rows, replaced, chosen_parts(table))
     rows = without_idle_controls(rows, str(path), _choosing_exciters(draft, rows))
+    rows = without_removed_parts(draft, rows)
     machine_rows = [row for row in rows if row.label not in replaced]
     question(
         draft,
