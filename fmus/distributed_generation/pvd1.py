@@ -44,6 +44,9 @@ S_N = 100.0  # default rating [MVA]: the base of networks
 P_0 = 0.8  # default power [pu, S_n]
 LEAST_LAG = 1e-3  # of the frequency [s]: no output follows an input at once
 LEAST_WIDTH = 1e-4  # of a straight line [pu, Hz], so that a step is one
+PER_UNIT = (
+    2.0  # frequency of a trip below which its number is per unit, as PowerWorld has it; else Hz
+)
 FRINGE = 1e-12  # square [pu²] below which no root is taken
 
 SOURCE = "ANDES' PVD1"
@@ -67,10 +70,22 @@ LINES = (
 CHOSEN = "chosen here"
 OWN_LINES = (
     pu("fdbd", 99.0, "Dead band of f − 1; its sign does not matter", base="f_n"),
-    number("Ft0", 47.0, "Frequency at which low frequency leaves none", 0, "Hz"),
-    number("Ft1", 47.5, "Frequency below which low frequency takes a share away", 0, "Hz"),
-    number("Ft2", 51.5, "Frequency above which high frequency takes a share away", 0, "Hz"),
-    number("Ft3", 52.0, "Frequency at which high frequency leaves none", 0, "Hz"),
+    number("Ft0", 47.0, "Frequency at which low frequency leaves none; below 2 per unit", 0, "Hz"),
+    number(
+        "Ft1",
+        47.5,
+        "Frequency below which low frequency takes a share away; below 2 per unit",
+        0,
+        "Hz",
+    ),
+    number(
+        "Ft2",
+        51.5,
+        "Frequency above which high frequency takes a share away; below 2 per unit",
+        0,
+        "Hz",
+    ),
+    number("Ft3", 52.0, "Frequency at which high frequency leaves none; below 2 per unit", 0, "Hz"),
     seconds("Tf", 0.02, "Filter of the frequency; at least 1 ms"),
     pu("Vtmax", 1.2, "Voltage above which reactive current is taken off", 0, base="bus"),
     pu("lvpnt1", 0.8, "Voltage below which the active current falls", 0, base="bus"),
@@ -127,7 +142,7 @@ def _declare_current(m: ModelBuilder, port: DevicePort, seen: ExtrapolatedVoltag
     lowered = fmax(reactive - p.Khv * fmax(v - p.Vtmax, 0), fmin(p.Qmin, reactive))
     now = _Seen(v, f, active * through_points(v, points), lowered)
     # an extrapolated voltage overshoots at a jump, and what is lost stays lost
-    share = _share_left(m, p, seen.once.magnitude(), f * f_n)
+    share = _share_left(m, p, seen.once.magnitude(), f * f_n, _trips_in_hertz(p, f_n))
     wanted = _commands(m, p, active_first, now, (at_start, command_0))
     for x, command in zip((active, reactive), wanted, strict=True):
         m.derivative(x, (command * share - x) / p.Tg)
@@ -170,15 +185,25 @@ def _support(p: Given, at: _Seen) -> Expr:
     return clamp(fabs(p.Dqdv) * beyond, p.Qmn, p.Qmx)
 
 
-def _share_left(m: ModelBuilder, p: Given, v: Expr, hertz: Expr) -> Expr:
+def _trips_in_hertz(p: Given, f_n: Expr) -> tuple[Expr, Expr, Expr, Expr]:
+    """Return Ft0 to Ft3 [Hz]."""
+    points = (if_else(f < PER_UNIT, f * f_n, f) for f in (p.Ft0, p.Ft1, p.Ft2, p.Ft3))
+    none, low, high, all_off = points
+    return none, low, high, all_off
+
+
+def _share_left(
+    m: ModelBuilder, p: Given, v: Expr, hertz: Expr, trips: tuple[Expr, Expr, Expr, Expr]
+) -> Expr:
     """Declare the memories; return the share that voltage and frequency leave."""
     by_voltage, by_frequency = p.Vrflag, p.Frflag
+    Ft0, Ft1, Ft2, Ft3 = trips
     left = Expr(1.0)
     for name, beyond, width, returning in (
         ("low_voltage", p.Vt1 - v, p.Vt1 - p.Vt0, by_voltage),
         ("high_voltage", v - p.Vt2, p.Vt3 - p.Vt2, by_voltage),
-        ("low_frequency", p.Ft1 - hertz, p.Ft1 - p.Ft0, by_frequency),
-        ("high_frequency", hertz - p.Ft2, p.Ft3 - p.Ft2, by_frequency),
+        ("low_frequency", Ft1 - hertz, Ft1 - Ft0, by_frequency),
+        ("high_frequency", hertz - Ft2, Ft3 - Ft2, by_frequency),
     ):
         lost_now = clamp(beyond / fmax(width, LEAST_WIDTH), 0, 1)
         with m.scope(f"trip_{name}"):
@@ -214,8 +239,7 @@ def _require_within(m: ModelBuilder, p: Given, at: _Seen, f_n: Expr) -> None:
         (at.v - p.lvpnt1, "a voltage below lvpnt1, where the active current falls"),
     ):
         m.require(margin + ROUNDING, f"the power flow asks for {text}")
-    for margin, text in (
-        (f_n - p.Ft1, "below Ft1"),
-        (p.Ft2 - f_n, "above Ft2"),
-    ):
-        m.require(margin, f"rated frequency lies {text}, where a share is off: give it in Hz")
+    _, Ft1, Ft2, _ = _trips_in_hertz(p, f_n)
+    for margin, text in ((f_n - Ft1, "below Ft1"), (Ft2 - f_n, "above Ft2")):
+        remedy = "give Ft0 to Ft3 in Hz, or per unit, on both sides of it"
+        m.require(margin, f"rated frequency lies {text}, where a share is off: {remedy}")

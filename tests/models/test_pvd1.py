@@ -230,6 +230,14 @@ def test_of_what_frequency_trips_a_part_comes_back(hertz, left, returning):
     assert found[-1]["share"] == pytest.approx(1 - (1 - returning) * (1 - left), abs=3e-3)
 
 
+def test_frequencies_of_trips_below_two_are_per_unit():
+    def turning(t):
+        return np.exp(2j * np.pi * (58.5 - 60) * t)
+
+    found = driven({"Ft0": 58 / 60, "Ft1": 59 / 60, "Ft2": 999.0, "Ft3": 999.0}, turning, 0.5)
+    assert found[-1]["share"] == pytest.approx(0.5, abs=3e-3)
+
+
 def test_low_voltage_lowers_the_active_current_and_high_voltage_the_reactive_one():
     low = driven(CURVE | {"Vt0": 0.1, "Vt1": 0.2, "lvpnt0": 0.4, "lvpnt1": 0.8}, dip(0.6), 0.4)[-1]
     assert low["I_p_fed"] == pytest.approx(0.5 * low["I_p_command"], abs=1e-4)
@@ -247,7 +255,10 @@ def test_low_voltage_lowers_the_active_current_and_high_voltage_the_reactive_one
         ({"Vt1": 1.01, "Vt0": 0.9}, "a voltage below Vt1"),
         ({"Vt2": 0.99, "Vt1": 0.9}, "a voltage above Vt2"),
         ({"lvpnt1": 1.02}, "a voltage below lvpnt1"),
-        ({"Ft0": 0.9, "Ft1": 0.95, "Ft2": 1.01, "Ft3": 1.02}, "above Ft2, where a share is off"),
+        (
+            {"Ft0": 47.0, "Ft1": 47.5, "Ft2": 51.5, "Ft3": 52.0},
+            "above Ft2, where a share is off: give Ft0 to Ft3 in Hz, or per unit",
+        ),
         ({"Vt0": 0.95, "Vt1": 0.9}, "Vt1 must not lie below Vt0"),
         ({"Qmn": 0.4}, "Qmx must not lie below Qmn"),
     ],

@@ -319,6 +319,32 @@ def test_records_that_lack_something_are_named(lines, words, prepared):
         prepared(with_records(*lines), "")
 
 
+MACHINE_OF_PVD1 = (
+    "3 'PVD1' 1 1 0.05 0.3 -0.3 0.98 1.04 -1.4 0.0006 20 1.2 0.5 0.88 1.1 1.2 0.5 57 58.5 60.6 61.5 0.25 0.02 0.04 "
+    "1.2 0.8 0.4 -1.3 0.7 /\n"
+)
+
+
+@pytest.mark.slow
+def test_small_photovoltaic_plants_are_the_whole_unit(prepared, tmp_path, gfor):
+    """A fault trips all of them by voltage, of which half comes back, and then a part by the jump of the frequency."""
+    plan = unit(prepared(with_records(MACHINE_OF_PVD1), ""))
+    assert plan.description.model_name == "pvd1_phasor"
+    given = plan.parameters
+    assert (given["Pqflag"], given["Vrflag"], given["Khv"]) == (True, 0.5, 0.7)
+    code, _, error = gfor("modes", tmp_path / "case.toml", "--json")
+    assert code == 0, error
+    words = ("--fault", "bus_9, 100 ms", "--stop", "2", "--out", tmp_path / "out")
+    code, _, error = gfor("run", tmp_path / "case.toml", *words)
+    assert code == 0, error
+    (path,) = (tmp_path / "out").rglob("*.nc")
+    with xr.open_dataset(path) as kept:
+        share = kept["gfor3.share"].values.ravel()
+    assert share[0] == 1.0
+    assert share.min() < 0.2
+    assert 0.3 < share[-1] < 0.5
+
+
 MACHINE_OF_B1 = (
     "3 'REGFMB1' 1 0 0 1 1 1 1 0.05 0 5 0.02 0.05 -0.05 0.265 2.65 0.2 -0.2 0 0.6 0 100 50 1 0.9 2 1.5 "
     "0.02 0.02 0 0 1 0.05 /\n"
