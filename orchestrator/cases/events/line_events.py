@@ -6,6 +6,7 @@ from dataclasses import replace
 from fmus.grid.element_data import Line
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.form import schema
+from orchestrator.cases.networks.transformer_kinds import is_known_transformer
 from orchestrator.core.options import Option
 from orchestrator.systems.coupling import events as coupled
 from orchestrator.systems.coupling.events import Event
@@ -70,6 +71,8 @@ def _opening(end: float, line: tuple[str, str], dead: float | None) -> list[Even
 
 
 def _line_fault(draft: Draft, table: schema.LineFaultTable, grid: str, where: str) -> list[Event]:
+    if _is_within_a_transformer(draft, table, where):
+        return []
     begin = coupled.LineFault(
         table.time, grid, table.line, table.at, True, R=table.R, X=table.X, kind=table.kind
     )
@@ -84,6 +87,31 @@ def _line_fault(draft: Draft, table: schema.LineFaultTable, grid: str, where: st
     elif table.opens == "pole" and closed is not None:
         events += _pole(draft, table, (grid, where), (end, closed))
     return events
+
+
+def _is_within_a_transformer(draft: Draft, table: schema.LineFaultTable, where: str) -> bool:
+    """Refuse a fault along what has no way: a transformer of two or three windings."""
+    network, line = draft.network, _line(draft, table.line)
+    windings = {x.name: x.buses for x in network.transformers} if network else {}
+    buses: tuple[str, ...] = windings.get(table.line, ())
+    kind = "three"
+    if line is not None:
+        asked = draft.given.case.network
+        of_file = draft.data.sequences.transformers if draft.data and draft.data.sequences else None
+        groups = asked.sequences.groups if asked else {}
+        if is_known_transformer(line, of_file, groups):
+            buses, kind = (line.from_bus, line.to_bus), "two"
+    if not buses:
+        return False
+    lasts = "100 ms" if table.duration is None else f"{1e3 * table.duration:g} ms"
+    draft.note(
+        where,
+        f"{table.line} is a transformer of {kind} windings, along which no fault has a place; put it at one of its "
+        f"buses, {', '.join(buses)}, as "
+        + Option.FAULT
+        + f" '{buses[0]}, {lasts}, opens {table.line}, from {table.time:g} s' does",
+    )
+    return True
 
 
 def _pole(

@@ -34,6 +34,7 @@ from orchestrator.cases.networks.sequence_data import (
     ZeroTransformer,
     windings_of,
 )
+from orchestrator.cases.networks.transformer_kinds import is_known_transformer
 from orchestrator.systems.coupling.system import ComponentPlan
 
 FAULT = "the fault's place"
@@ -177,11 +178,10 @@ class SequenceAssembly:
 
     def _is_transformer(self, line: Line) -> bool:
         """Return whether a branch is a transformer: by its file, by the case, or by a ratio or a unit at its end."""
-        if line.name in self.table.groups:
-            return True
-        if self.data.transformers is not None:
-            return line.name in self.data.transformers
-        return line.has_ratio or (not line.B and self._unit_side(line) is not None)
+        of_file = self.data.transformers
+        if is_known_transformer(line, of_file, self.table.groups) or of_file is not None:
+            return is_known_transformer(line, of_file, self.table.groups)
+        return not line.B and self._unit_side(line) is not None
 
     def _unit_side(self, line: Line) -> int | None:
         """Return the end, 0 or 1, at which units stand and no other branch; None where there is none."""

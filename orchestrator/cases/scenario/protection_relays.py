@@ -17,7 +17,7 @@ from orchestrator.cases.networks.psse.relay_records import (
     unit_relays,
 )
 from orchestrator.cases.networks.step_ups import own_branches
-from orchestrator.core.errors import Problem, QuestionTopic
+from orchestrator.core.errors import InputError, Problem, QuestionTopic, few
 from orchestrator.core.options import Option
 from orchestrator.systems.coupling.events import Event, LineSwitching, UnitSwitching
 from orchestrator.systems.coupling.no_trip_regions import NO_TRIP_REGIONS
@@ -29,6 +29,7 @@ _UNITS = {"voltage": "pu", "frequency": "Hz"}
 _DISTRIBUTED = (
     "dera1_phasor"  # model of what a distribution network feeds: codes of plants are not its
 )
+_NAMED = 3  # relays that an error names; the others are counted
 _WIND = "WT"  # how the names of records begin that only wind turbines have
 _LONGEST_ASKED = 60.0  # delay [s] from which a relay trips after the end of most runs
 _OTHER_FREQUENCY = 1.0  # difference [Hz] from which a system has another rated frequency
@@ -265,3 +266,32 @@ def _ask_at_rest(
     )
     topic = QuestionTopic("a relay beyond its limit at rest", relay.of)
     draft.found.questions.append(Problem(place, text, topic=topic))
+
+
+def require_no_relays(relays: Sequence[Relay], what: str) -> None:
+    """Refuse relays where nothing can carry them.
+
+    Parameters
+    ----------
+    relays
+        The relays of a scenario.
+    what
+        What cannot carry them, as the begin of a sentence: "an SSP cannot hold".
+
+    Raises
+    ------
+    InputError
+        If there are any; it names them, and how to leave them out.
+    """
+    if not relays:
+        return
+    codes = {region.title for regions in NO_TRIP_REGIONS.values() for region in regions}
+    records = list(dict.fromkeys(x.record for x in relays if x.record not in codes))
+    named = list(dict.fromkeys(f"{relay.record} of {relay.of}" for relay in relays))
+    remedies = [f"dyr_leave_out = {records} in [units]"] if records else []
+    if len(records) < len({relay.record for relay in relays}):
+        remedies.append("no protection at the top of the case (" + Option.PROTECTION + ")")
+    raise InputError(
+        f"{what} relays ({few(named, _NAMED)}), which order events in a run: leave them out by "
+        f"{' and '.join(remedies)}"
+    )

@@ -5,6 +5,7 @@ from typing import Any
 
 from fmus.toolchain.archive import write_archive
 from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.cases.scenario.protection_relays import require_no_relays
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.asked import require_known
 from orchestrator.core.errors import InputError
@@ -100,7 +101,14 @@ def export(what: Any, kind: str, out: str | Path | None = None, **how: Any) -> l
 
 
 def write_ssp(prepared: PreparedScenario, target: Path) -> None:
-    """Write a scenario as SSP archive."""
+    """Write a scenario as SSP archive.
+
+    Raises
+    ------
+    InputError
+        If it has what an SSP cannot hold, such as relays, or the file cannot be written.
+    """
+    require_no_relays(prepared.relays, "an SSP cannot hold")
     case = prepared.case
     tables: dict[str, Any] = case.table.model_dump(
         mode="json", by_alias=True, exclude_none=True, exclude_unset=True, include=_TABLES

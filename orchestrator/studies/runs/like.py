@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.cases.scenario.protection_relays import require_no_relays
 from orchestrator.core.errors import InputError
 from orchestrator.core.late import xr
 from orchestrator.output.results.storage import trajectory_dataset
@@ -76,6 +77,7 @@ def run_like(
     """Run a scenario from what its FMUs start with, along another master's rules.
 
     The operating point is not improved before and no modes are computed: another master does neither."""
+    require_no_relays(prepared.relays, f"{rules.title} knows no")
     emulation = emulate(
         prepared.system,
         rules,

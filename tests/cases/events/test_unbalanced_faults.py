@@ -3,6 +3,8 @@
 The reference knows no sequence networks: each element is a matrix of three phases, the fault an admittance between
 phases or to earth, an open pole a phase without a conductor."""
 
+import re
+
 import numpy as np
 import pandapower as pp
 import pytest
@@ -11,7 +13,7 @@ from pandapower import shortcircuit as sc
 import orchestrator as gfor
 from fmus.grid.network import OPEN_CHARGING
 from orchestrator.cases.case import load_case
-from orchestrator.cases.forcing import event_of
+from orchestrator.cases.forcing import event_of, with_events
 from orchestrator.core.errors import CaseError, InputError
 from orchestrator.core.options import Option
 from orchestrator.systems.coupling.events import (
@@ -273,6 +275,29 @@ def test_keys_of_a_fault_along_a_line_that_do_not_fit(keys, words, tmp_path):
         prepared(
             tmp_path, f'[[events]]\ntype = "line_fault"\ntime = "0.1 s"\nline = "l23"\n{keys}\n'
         )
+
+
+@pytest.mark.parametrize(
+    ("case", "name", "kind"), [("ieee39", "line_2_30", "two"), ("three", "t", "three")]
+)
+def test_a_fault_along_a_transformer_is_refused_and_the_remedy_works(case, name, kind, tmp_path):
+    if case == "three":
+        table = "buses = ['b1', 'b2', 'b3'], X_12 = 0.2, X_13 = 0.2, X_23 = 0.2"
+        windings = f"[network]\nthree_winding_transformers.t = {{ {table} }}"
+        (tmp_path / "case.toml").write_text(RING.replace("[network]", windings))
+        case = tmp_path / "case.toml"
+    read, phasor = load_case(case), {"models": "phasor"}
+    first = next(iter(read.scenarios))
+    within = with_events(read, [], [f"{name} at 50 %, 100 ms, opens it, from 0.2 s"])
+    with pytest.raises(CaseError, match=f"{name} is a transformer of {kind} windings") as refused:
+        within.prepare([first], phasor)
+    (remedy,) = re.findall(r"as --fault '([^']*)' does", str(refused.value))
+    (ready,) = with_events(read, [], [remedy]).prepare([first], phasor)
+    assert [type(event).__name__ for event in ready.events] == [
+        "BusFault",
+        "BusFault",
+        "LineSwitching",
+    ]
 
 
 def test_a_short_circuit_of_one_phase_has_pandapowers_current(tmp_path):

@@ -1,12 +1,18 @@
 """Relays in runs: the times at which they trip against hand calculation, what they leave on, and who tells of it."""
 
+import re
+
 import numpy as np
 import pytest
 
 from orchestrator.cases.networks.record_use import UseOfRecord
+from orchestrator.core.errors import InputError
+from orchestrator.face.api.export import write_ssp
+from orchestrator.simulation.interop.rules import master_rules
 from orchestrator.studies.modes.modes import running
 from orchestrator.studies.runs.answer_of_run import of_run
 from orchestrator.studies.runs.files import summary_of
+from orchestrator.studies.runs.like import run_like
 from orchestrator.studies.runs.run import run_scenario
 from orchestrator.systems.coupling.relays import FREQUENCY_LAG, Relays
 from tests.support.mill import mill_case
@@ -203,3 +209,21 @@ def test_a_relay_of_what_is_not_there_is_listed_and_not_used(prepared):
     assert second.why == "a relay of bus 9, which is no bus here"
     assert first.use is second.use is UseOfRecord.NOT_USED
     assert ready.relays == ()
+
+
+def exported(ready, tmp_path):
+    write_ssp(ready, tmp_path / "mill.ssp")
+
+
+def emulated(ready, tmp_path):
+    run_like(ready, master_rules("libcosim"))
+
+
+@pytest.mark.parametrize("carry", [exported, emulated])
+def test_what_cannot_carry_relays_refuses_them_by_name(carry, prepared, tmp_path):
+    """An SSP and other masters would lose the trips and say nothing; the remedy that is told works."""
+    relays = ["1 'VTGTPAT' 2 2 '1' 0.8 9 0.05 0", "2 'LVSHBL' 1 0.8 0.05 0.4 0 0 0 0 0 0 0.02"]
+    with pytest.raises(InputError, match=r"VTGTPAT of sg2, LVSHBL of load_2") as refused:
+        carry(prepared(relays, stop=0.1), tmp_path)
+    remedy = re.search(r"dyr_leave_out = \[.*?\]", str(refused.value)).group()
+    carry(prepared(relays, stop=0.1, units=remedy), tmp_path)
