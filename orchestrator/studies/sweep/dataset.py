@@ -89,26 +89,41 @@ class Samples:
         return {axis.key: axis.values[int(i)] for axis, i in zip(self.axes, place, strict=True)}
 
 
+Labelled = dict[str, tuple[list[str], Any]]
+"""Arrays with the names of their dimensions, by the name in the dataset."""
+
+
 def sweep_dataset(samples: Samples) -> xr.Dataset:
     """Everything over (scenario, varied parameters, trajectory); NaN where a trajectory is not."""
-    result, axes = samples.result, samples.axes
-    sizes = [len(axis.values) for axis in axes]
-    grid = [axis.key for axis in axes]
-    longest = max((len(s.trajectories) for s in result.scenarios), default=0)
-    shape = (len(result.scenarios), *sizes, longest)
-    dims = ["scenario", *grid, "trajectory"]
+    arrays = _of_trajectories(samples) | _of_points(samples)
+    data: dict[str, Any] = {
+        name: (*found, dict(_ATTRIBUTES[name])) for name, found in arrays.items()
+    }
+    flags = {"flag_values": list(range(5)), "flag_meanings": _BEGINNINGS, "_FillValue": np.int8(-1)}
+    data["beginning"][2].update(flags)
+    data["stable"][2]["_FillValue"] = np.int8(-1)
+    return xr.Dataset(data, coords=_coordinates(samples), attrs=_attributes(samples))
+
+
+def _most_trajectories(samples: Samples) -> int:
+    return max((len(s.trajectories) for s in samples.result.scenarios), default=0)
+
+
+def _sizes_of_points(samples: Samples) -> tuple[int, ...]:
+    """Sizes of the scenarios and of the grid of points."""
+    return (len(samples.result.scenarios), *(len(axis.values) for axis in samples.axes))
+
+
+def _of_trajectories(samples: Samples) -> Labelled:
+    """Figures of each trajectory's mode at each point."""
+    shape = (*_sizes_of_points(samples), _most_trajectories(samples))
+    dims = ["scenario", *(axis.key for axis in samples.axes), "trajectory"]
     figures = {name: np.full(shape, np.nan) for name in _FIGURES}
     named, beginning = np.zeros(shape, dtype=np.int8), np.full(shape, -1, dtype=np.int8)
     of_states = np.full((*shape, len(samples.states)), np.nan)
     of_components = np.full((*shape, len(samples.components)), np.nan)
-    names = [[""] * longest for _ in result.scenarios]
-    residual, errors = np.full(shape[:-1], np.nan), np.full(shape[:-1], "", dtype=object)
-    warnings = np.full(shape[:-1], "", dtype=object)
-    growth, hertz = np.full(shape[:-1], np.nan), np.full(shape[:-1], np.nan)
-    stable = np.full(shape[:-1], -1, dtype=np.int8)
-    for s, sweep in enumerate(result.scenarios):
+    for s, sweep in enumerate(samples.result.scenarios):
         for t, trajectory in enumerate(sweep.trajectories):
-            names[s][t] = trajectory.name
             for place, sample in samples.of(sweep, trajectory):
                 at = (s, *(int(i) for i in place), t)
                 for name, array in figures.items():
@@ -118,44 +133,56 @@ def sweep_dataset(samples: Samples) -> xr.Dataset:
                 of_components[at] = [
                     sample["components"].get(name, np.nan) for name in samples.components
                 ]
-        for place in itertools.product(*map(range, sizes)):
-            residual[(s, *place)] = sweep.points[place].residual
-            errors[(s, *place)] = sweep.points[place].error or ""
-            warnings[(s, *place)] = _SEPARATOR.join(sweep.points[place].warnings)
-            verdict = sweep.points[place].stability
-            for key, array in (
-                ("stable", stable),
-                ("largest_growth_rate", growth),
-                ("frequency_hz", hertz),
-            ):
-                if verdict.get(key) is not None:
-                    array[(s, *place)] = verdict[key]
-    flags = {"flag_values": list(range(5)), "flag_meanings": _BEGINNINGS, "_FillValue": np.int8(-1)}
-    at_points = {
-        "residual": residual,
-        "stable": stable,
-        "largest_growth_rate": growth,
-        "largest_growth_frequency": hertz,
-        "error": errors.astype(str),
-        "warnings": warnings.astype(str),
-    }
-    arrays: dict[str, tuple[list[str], Any]] = {
+    return {
         **{_IN_DATASET.get(name, name): (dims, array) for name, array in figures.items()},
         "named": (dims, named),
         "beginning": (dims, beginning),
         "participation": ([*dims, "state"], of_states),
         "component_participation": ([*dims, "component"], of_components),
-        **{name: (dims[:-1], array) for name, array in at_points.items()},
     }
-    data: dict[str, Any] = {
-        name: (*found, dict(_ATTRIBUTES[name])) for name, found in arrays.items()
+
+
+def _of_points(samples: Samples) -> Labelled:
+    """Residual, verdict, error and warnings of each point."""
+    shape = _sizes_of_points(samples)
+    dims = ["scenario", *(axis.key for axis in samples.axes)]
+    residual = np.full(shape, np.nan)
+    errors, warnings = (np.full(shape, "", dtype=object) for _ in range(2))
+    verdicts = {
+        "stable": np.full(shape, -1, dtype=np.int8),
+        "largest_growth_rate": np.full(shape, np.nan),
+        "frequency_hz": np.full(shape, np.nan),
     }
-    data["beginning"][2].update(flags)
-    data["stable"][2]["_FillValue"] = np.int8(-1)
+    for s, sweep in enumerate(samples.result.scenarios):
+        for place in itertools.product(*map(range, shape[1:])):
+            point, at = sweep.points[place], (s, *place)
+            residual[at] = point.residual
+            errors[at] = point.error or ""
+            warnings[at] = _SEPARATOR.join(point.warnings)
+            for key, array in verdicts.items():
+                if point.stability.get(key) is not None:
+                    array[at] = point.stability[key]
+    at_points = {
+        "residual": residual,
+        "stable": verdicts["stable"],
+        "largest_growth_rate": verdicts["largest_growth_rate"],
+        "largest_growth_frequency": verdicts["frequency_hz"],
+        "error": errors.astype(str),
+        "warnings": warnings.astype(str),
+    }
+    return {name: (dims, array) for name, array in at_points.items()}
+
+
+def _coordinates(samples: Samples) -> dict[str, Any]:
+    """Names of scenarios, trajectories, states and components, and the values of the axes."""
+    scenarios, longest = samples.result.scenarios, _most_trajectories(samples)
+    names = [[""] * longest for _ in scenarios]
+    for row, sweep in zip(names, scenarios, strict=True):
+        row[: len(sweep.trajectories)] = [trajectory.name for trajectory in sweep.trajectories]
     coordinates: dict[str, Any] = {
         "scenario": (
             "scenario",
-            [s.prepared.name for s in result.scenarios],
+            [s.prepared.name for s in scenarios],
             {"long_name": "Scenario"},
         ),
         "trajectory": (
@@ -171,14 +198,14 @@ def sweep_dataset(samples: Samples) -> xr.Dataset:
         "state": ("state", samples.states, {"long_name": "State"}),
         "component": ("component", samples.components, {"long_name": "Component"}),
     }
-    for axis in axes:
+    for axis in samples.axes:
         values = [float(value) for value in axis.values]
         coordinates[axis.key] = (
             axis.key,
             values,
             {"units": axis.unit or "1", "long_name": axis.title},
         )
-    return xr.Dataset(data, coords=coordinates, attrs=_attributes(samples))
+    return coordinates
 
 
 def _attributes(samples: Samples) -> dict[str, Any]:
