@@ -111,13 +111,13 @@ def declare_filter(
         i_g = qd_state(m, "i_g", start.i_g, "Current into the grid")
     u = u_c.value + data.R_cap * (i_s.value - i_g.value)
     return Filter(
-        data.R_c,
-        data.X_c,
-        data.B_c,
-        data.R_t,
-        data.X_t,
-        data.R_cap,
-        start,
+        R_c=data.R_c,
+        X_c=data.X_c,
+        B_c=data.B_c,
+        R_t=data.R_t,
+        X_t=data.X_t,
+        R_cap=data.R_cap,
+        initial=start,
         i_s=i_s,
         u_c=u_c,
         i_g=i_g,

@@ -123,12 +123,12 @@ class ModelBuilder:
                 unit,
                 description,
                 base,
-                float(start),
-                minimum,
-                maximum,
-                tunable,
-                type,
-                source,
+                start=float(start),
+                minimum=minimum,
+                maximum=maximum,
+                tunable=tunable,
+                type=type,
+                source=source,
             )
         )
 

@@ -233,10 +233,10 @@ def forcing_events(
             table.time,
             table.component,
             tunable[wanted],
-            table.frequency,
-            table.amplitude,
-            table.shape,
-            table.end,
+            frequency=table.frequency,
+            amplitude=table.amplitude,
+            shape=table.shape,
+            end=table.end,
         )
     ]
 

@@ -144,8 +144,7 @@ def _criteria(found: Certificate) -> PlainTable:
 
 def _show_damping_test(found: DampingCertificate, console: Console) -> None:
     print_parts(console, map(escape, _misfits(p.findings for p in found.results.values())))
-    table = make_table(
-        f"Damping test, {found.signal} watched",
+    headings = (
         "X_L [pu]",
         "least damped [Hz]",
         "ξ [%]",
@@ -153,8 +152,8 @@ def _show_damping_test(found: DampingCertificate, console: Console) -> None:
         "ΔP5M5/ΔP1M1",
         "in the signal: ξ [%]",
         "",
-        left=0,
     )
+    table = make_table(f"Damping test, {found.signal} watched", *headings, left=0)
     for v in found.verdicts:
         refusal = Text("not accepted" if v.is_judged else NOT_JUDGED, "red")
         table.add_row(f"{v.X_L:g}", *_figures(v), "accepted" if v.accepted else refusal)

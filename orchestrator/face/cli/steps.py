@@ -40,9 +40,8 @@ def _print(choice: StepChoice) -> None:
             f"{z.imag / (2 * np.pi):.4g} Hz, {damping_percent(z):.2f} %" for z in choice.critical
         )
     )
-    table = make_table(
-        "Steps", "Schedule", "Step", "Δf [mHz]", "Δξ [points]", "Growth [1/s]", "Verdict"
-    )
+    headings = ("Schedule", "Step", "Δf [mHz]", "Δξ [points]", "Growth [1/s]", "Verdict")
+    table = make_table("Steps", *headings)
     for trial in choice.trials:
         step = f"{1e6 * trial.step_size:g} µs"
         if trial.refused:

@@ -123,16 +123,8 @@ def mode_shifts(results: Sequence[RunResult]) -> ShownTable:
 
 
 def run_statistics(results: Sequence[RunResult]) -> Table:
-    table = make_table(
-        "Run",
-        "Scenario",
-        "Steps",
-        "Steps/s",
-        "× real time",
-        "Threads",
-        "Time in FMUs",
-        "By component",
-    )
+    headings = ("Steps", "Steps/s", "× real time", "Threads", "Time in FMUs", "By component")
+    table = make_table("Run", "Scenario", *headings)
     for r in results:
         s = r.statistics
         if s:

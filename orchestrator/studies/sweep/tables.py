@@ -23,9 +23,8 @@ def trajectories(samples: Samples) -> Table:
 
     The table shows the trajectories with a name, or all trajectories if the case names no mode."""
     title = f"Each mode over {', '.join(axis_label(axis) for axis in samples.axes)}"
-    table = make_table(
-        title, "Mode", "f [Hz]", "Damping [%]", "Least [%]", "Most [%]", "Points", "Alike"
-    )
+    figures = ("f [Hz]", "Damping [%]", "Least [%]", "Most [%]", "Points", "Alike")
+    table = make_table(title, "Mode", *figures)
     anything = any(t.case_name for s in samples.result.scenarios for t in s.trajectories)
     for sweep in samples.result.scenarios:
         for trajectory in sweep.trajectories:
