@@ -73,7 +73,7 @@ def _keywords(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _exit_code(found: Validation) -> int:
-    if found.result.fit is not None and not found.result.fit.finished:
+    if not found.result.finished:
         return INTERRUPTED
     return 0 if found.result.verdict in (None, LimitVerdict.MET) else NOT_MET
 

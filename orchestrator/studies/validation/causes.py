@@ -78,6 +78,14 @@ class Explanation:
         }
 
 
+@dataclass(frozen=True)
+class CauseSearch:
+    """Causes that were found, the one that leaves the least first; ``finished``: whether all were tried."""
+
+    causes: Sequence[Explanation]
+    finished: bool = True
+
+
 def later(
     responses: Responses, without: Responses, intervals: Sequence[float], delay: float
 ) -> list[Complex]:

@@ -20,6 +20,7 @@ from orchestrator.studies.black_box.bench import drive
 from orchestrator.studies.validation.averaging import averaged
 from orchestrator.studies.validation.instances import InstanceShelf
 from orchestrator.studies.validation.record import Recording
+from orchestrator.studies.validation.trials import TrialLog
 from orchestrator.systems.coupling.step_awareness import STEP_PARAMETER
 
 _VOLTAGE, _CURRENT = ("v_re", "v_im"), ("i_re", "i_im")
@@ -78,6 +79,7 @@ class PlayedDevice:
     held: Mapping[str, float] = field(default_factory=dict)  # its other inputs
     isolated: bool | None = None  # as in `open_component`
     shelf: InstanceShelf = field(default_factory=InstanceShelf, compare=False)
+    trials: TrialLog = field(default_factory=TrialLog, compare=False)  # that it refused
 
     @property
     def path(self) -> Path:

@@ -14,10 +14,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers
-from orchestrator.core.errors import CosimError
 from orchestrator.devices.fmi.description import VariableInfo
 from orchestrator.studies.validation.causes import (
     CauseKind,
+    CauseSearch,
     Explanation,
     cap_of_current,
     capped,
@@ -47,23 +47,35 @@ Responses = Sequence[Complex]
 
 def explain_errors(
     device: PlayedDevice, events: Sequence[RecordedEvent], report: Report = lambda text: None
-) -> list[Explanation]:
+) -> CauseSearch:
     """Causes that would explain the errors, each by itself, the one that leaves the least first.
 
-    Of long recordings the first seconds of the events with the largest errors are looked at."""
+    Of long recordings the first seconds of the events with the largest errors are looked at. Ctrl-C leaves the causes
+    that were found until then."""
+    found: list[Explanation] = []
+    finished = True
+    try:
+        for one in _causes(device, events, report):
+            found.append(one)
+    except KeyboardInterrupt:
+        finished = False
+    better = [one for one in found if one.left < one.error]
+    return CauseSearch(sorted(better, key=lambda one: one.left), finished)
+
+
+def _causes(
+    device: PlayedDevice, events: Sequence[RecordedEvent], report: Report
+) -> Iterator[Explanation]:
+    """Causes as they are found, the quickest first."""
     looked_at = _looked_at(device, events)
     bench = _Bench(device, looked_at, report)
     rough = bench if device.rough is device else _Bench(device.rough, looked_at, report)
+    yield from _positions(bench, rough)
     promises = list(_promises(rough, rough.parameters("Real")))
     bench.idle = rough.idle
-    found = [
-        *_positions(bench, rough),
-        *_numbers(bench, rough, promises),
-        *_delays(rough, promises),
-    ]
-    found += _limits(bench)
-    better = [one for one in found if one.left < one.error]
-    return sorted(better, key=lambda one: one.left)
+    yield from _numbers(bench, rough, promises)
+    yield from _delays(rough, promises)
+    yield from _limits(bench)
 
 
 def _looked_at(device: PlayedDevice, events: Sequence[RecordedEvent]) -> list[RecordedEvent]:
@@ -126,10 +138,11 @@ class _Bench:
     def responses(self, values: Values) -> Responses | None:
         """The device's answers with other values; None where it does not run with them."""
         device = self.device.with_values(values)
-        try:
-            return [device.play(one.recording, one.start).power for one in self.events]
-        except CosimError:
-            return None
+        found: Responses | None = None
+        tried = ", ".join(f"{name} = {_plainly(value)}" for name, value in values.items())
+        with device.trials.trial(tried):
+            found = [device.play(one.recording, one.start).power for one in self.events]
+        return found
 
     def errors(self, responses: Responses) -> Numbers:
         """All errors of P and Q, of which the squares add up; those before the event count a start that is off.
@@ -361,6 +374,10 @@ def _limiter(bench: _Bench, info: VariableInfo, values: Values) -> Iterator[Expl
     else:
         now = bench.device.value(info.name)
         yield bench.explanation(CauseKind.VALUE, info.name, now, value, left, unit=info.unit or "")
+
+
+def _plainly(value: float | bool) -> str:
+    return str(value).lower() if isinstance(value, bool) else f"{value:.6g}"
 
 
 def _squares(error: Numbers) -> float:

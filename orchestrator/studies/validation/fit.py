@@ -42,6 +42,11 @@ _COARSE = (
 )
 _COARSE_TOLERANCE = 1e-3  # relative
 _STARTS = 4  # from which a fit begins, one after the other, until the recordings are reached
+_DOUBLINGS = (
+    5  # up and down, at which a parameter's own curve is looked at where the first fit fails
+)
+_LEAVES = 0.8  # part of the error at the start which a fit may leave, to have found anything
+_NEAR_BOUND = 1e-3  # part of a parameter's reach, from a bound, at which it counts as on it
 _FARTHEST = 0.5  # part of a parameter's reach by which a start is off the value in the model
 
 
@@ -53,6 +58,7 @@ class Untold(StrEnum):
     TOO_FAST = "too fast"
     AT_BOUND = "at its bound"
     WIDE = "wide"
+    NO_BETTER = "no better than the start"
 
 
 @dataclass(frozen=True)
@@ -154,7 +160,10 @@ def fit_parameters(
         if not trials[-1].finished:
             break
     best = min(trials, key=lambda one: one.cost)
-    found = [*_switches(best, trials, starts, residuals), *_numbers(best, wanted, residuals)]
+    numbers = _numbers(best, wanted, residuals)
+    if _rms(best.errors) > max(_REACHED, _LEAVES * _rms(before)):
+        numbers = [_left_at_start(one) for one in numbers]
+    found = [*_switches(best, trials, starts, residuals), *numbers]
     return Fit(
         parameters=found,
         fitted_to=[one.recording.label for one in events],
@@ -179,12 +188,11 @@ def _trial(
     finished = True
     slopes = None
     try:
-        for begin in _starts(told):
+        for begin in _starts(residuals, told, switches):
             _least_squares(residuals, begin, switches, best)
             if best.rms <= _REACHED:
                 break
-        at = [replace(one, start=float(best.values[one.name])) for one in told]
-        own = residuals.slopes(best.values, {one.name: one.step for one in at})
+        own = _slopes_inside(residuals, told, best.values)
         slopes = np.column_stack([own, residuals.hidden_slopes(best.values)])
     except KeyboardInterrupt:
         finished = False
@@ -194,15 +202,54 @@ def _trial(
     return _Trial(switches, told, untold, best.values, errors, slopes=slopes, finished=finished)
 
 
-def _starts(told: Sequence[Adjustable]) -> Iterator[list[Adjustable]]:
-    """The parameters as the model has them, and then at other points, spread evenly and always the same."""
+def _starts(
+    residuals: Residuals, told: Sequence[Adjustable], switches: Mapping[str, bool]
+) -> Iterator[list[Adjustable]]:
+    """The parameters as the model has them; each at the best of its own curve; then points spread evenly around.
+
+    Each is asked for only if the fits from those before it did not reach the recordings."""
     yield list(told)
+    yield _best_of_curves(residuals, told, switches)
     points = stats.qmc.Halton(len(told), seed=1).random(_STARTS - 1)
     for point in points:
         yield [
             replace(one, start=one.start + (2 * part - 1) * _FARTHEST * one.reach)
             for one, part in zip(told, map(float, point), strict=True)
         ]
+
+
+def _best_of_curves(
+    residuals: Residuals, told: Sequence[Adjustable], switches: Mapping[str, bool]
+) -> list[Adjustable]:
+    """One parameter after the other at the doubling or halving of its start that leaves the least in the mean.
+
+    From far away, as a tenth of an inertia, no slope leads to the value: the swing is out of phase all the way."""
+    values: dict[str, float | bool] = {**switches, **{one.name: one.inside() for one in told}}
+    factors = [2.0**k for k in range(-_DOUBLINGS, _DOUBLINGS + 1)]
+
+    def cost(name: str, value: float) -> float:
+        errors = means_over(residuals.stretches, _COARSE, residuals.at({**values, name: value}))
+        return float(np.sum(errors**2))
+
+    found = []
+    for one in told:
+        residuals.report(f"looking along {one.name}")
+        curve = {factor * one.start for factor in factors} | {float(values[one.name])}
+        inside = sorted(x for x in curve if one.low <= x <= one.high)
+        costs = [cost(one.name, x) for x in inside]
+        values[one.name] = inside[int(np.argmin(costs))]
+        found.append(replace(one, start=float(values[one.name])))
+    return found
+
+
+def _slopes_inside(
+    residuals: Residuals, told: Sequence[Adjustable], values: Mapping[str, float | bool]
+) -> Matrix:
+    """How the errors move with each parameter; next to a bound at a point so far within it that both sides are."""
+    at = [replace(one, start=float(values[one.name])) for one in told]
+    within = [replace(one, start=one.inside()) for one in at]
+    there = {**values, **{one.name: one.start for one in within}}
+    return residuals.slopes(there, {one.name: one.step for one in within})
 
 
 def _least_squares(
@@ -229,8 +276,7 @@ def _least_squares(
 
     def slopes(x: Numbers) -> Matrix:
         given = values(x)
-        at = [replace(one, start=float(given[one.name])) for one in told]
-        own = residuals.slopes(given, {one.name: one.step for one in at})
+        own = _slopes_inside(residuals, told, given)
         return np.asarray(np.column_stack([own, residuals.hidden_slopes(given)]) * reach)
 
     free = len(hidden)
@@ -305,16 +351,27 @@ def _numbers(best: _Trial, wanted: Wanted, residuals: Residuals) -> list[FittedP
         value, width = float(best.values[one.name]), widths.get(one.name)
         fitted = FittedParameter(one.name, one.unit, one.start, value, None, None)
         if width is not None:
-            fitted = replace(fitted, low=value - width, high=value + width)
-            fitted = replace(fitted, untold=_doubt(one, value, width))
+            doubt = _doubt(one, value, width)
+            fitted = replace(fitted, untold=doubt)
+            if doubt is not Untold.AT_BOUND and np.isfinite(
+                width
+            ):  # there the interval ends at no error's minimum
+                fitted = replace(fitted, low=value - width, high=value + width)
         found.append(fitted)
     return found
+
+
+def _left_at_start(one: FittedParameter) -> FittedParameter:
+    """A parameter of a fit that found nothing better: where the model has it, without an interval."""
+    if one.untold not in (None, Untold.AT_BOUND, Untold.WIDE):
+        return one
+    return replace(one, value=one.start, low=None, high=None, untold=Untold.NO_BETTER)
 
 
 def _doubt(one: Adjustable, value: float, width: float) -> Untold | None:
     if width > max(one.reach, abs(value)):
         return Untold.WIDE
-    near = 1e-6 * (one.high - one.low)
+    near = max(1e-6 * (one.high - one.low), _NEAR_BOUND * one.reach)  # the solver stays within
     at_bound = min(value - one.low, one.high - value) <= near
     return Untold.AT_BOUND if at_bound else None
 
@@ -325,6 +382,8 @@ def _half_widths(best: _Trial, residuals: Residuals) -> dict[str, float]:
     None if the fit was interrupted."""
     if best.slopes is None:
         return {}
+    if np.linalg.matrix_rank(best.slopes) < best.slopes.shape[1]:
+        return {one.name: np.inf for one in best.told}
     spread = np.sqrt(np.diag(covariance(best.slopes, best.errors, residuals.stretches)))
     free = independent_samples(best.errors, residuals.stretches) - len(spread)
     quantile = float(stats.t.ppf(0.5 + _SURE / 2, max(free, 3.0)))

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers
-from orchestrator.core.errors import CosimError
 from orchestrator.core.options import Option
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import (
@@ -307,14 +306,11 @@ def _error_left(
     """The rms error that a reading leaves; nothing where the device cannot start so.
 
     The error is counted per unit of the power as it would then be read."""
-    windows = event.windows
-    try:
-        changed = prepare_event(reading.change(event.recording), bases, windows)
+    with device.trials.trial(reading.name):
+        changed = prepare_event(reading.change(event.recording), bases, event.windows)
         played = device.play(changed.recording, changed.start)
-    except CosimError:
-        return
-    errors = zip(rms_error(played.power, changed), reading.scales(), strict=True)
-    yield math.hypot(*(error / scale for error, scale in errors))
+        errors = zip(rms_error(played.power, changed), reading.scales(), strict=True)
+        yield math.hypot(*(error / scale for error, scale in errors))
 
 
 def _meter_elsewhere(
@@ -341,7 +337,8 @@ def _meters_beyond(
 
     part = near.recording.good & (near.recording.times > near.windows.begin)
     here: Complex = (comparison.near_power(near) - near.recording.power)[part]
-    try:
+    left = math.inf
+    with device.trials.trial(f"a transformer between port and meters{_which(beyond)}"):
         way = misses(near, _TRIED_REACTANCE) - here
         size = float(np.sum(np.abs(way) ** 2))
         times = -float(np.real(np.vdot(way, here))) / size if size > 0 else 0.0
@@ -351,11 +348,13 @@ def _meters_beyond(
         if not likely:
             return
         left = float(np.sqrt(np.mean(np.abs(misses(comparison.event, reactance)) ** 2)))
-    except CosimError:
-        return
     if left <= (_LEAVES if beyond is Beyond.ALL else _LEAVES_ALONE) * error:
         figures = {"reactance": reactance, "error": error, "left": left, "of": str(beyond)}
         yield left / error, Question(QuestionKind.METER_ELSEWHERE, figures)
+
+
+def _which(beyond: Beyond) -> str:
+    return "" if beyond is Beyond.ALL else f" of {beyond} alone"
 
 
 def _time_unit(comparison: EventComparison, bases: PortBases, error: float) -> Iterator[Question]:
@@ -370,13 +369,12 @@ def _time_unit(comparison: EventComparison, bases: PortBases, error: float) -> I
         ):
             continue
         timed = replace(whole, interval=interval, begin=seconds * whole.begin)
-        try:
+        left = math.inf
+        with comparison.device.trials.trial(f"times in {unit}"):
             event = prepare_event(at_port(timed, AT_PORT), bases)
             near = cut_event(event, _AFTER, _BEFORE)
             power = comparison.device.play(near.recording, near.start).power
-        except CosimError:
-            continue
-        left = math.hypot(*rms_error(power, near))
+            left = math.hypot(*rms_error(power, near))
         if left <= _LEAVES * error:
             figures = {"unit": unit, "interval": whole.interval, "length": whole.length}
             figures |= {"error": error, "left": left, "remedy": f"time=time in {unit}"}
@@ -393,13 +391,12 @@ def _rated_otherwise(comparison: EventComparison, error: float) -> Iterator[tupl
     near, (hertz,) = cut_event(event, _AFTER, _BEFORE), others
     other = device.with_values({"f_n": hertz})
     here = math.hypot(*rms_error(comparison.near_power(near), near))
-    try:
+    left = math.inf
+    with device.trials.trial(f"f_n = {hertz:g}"):
         power = other.play(near.recording, near.start).power
         if math.hypot(*rms_error(power, near)) > _LEAVES * here:
             return
         left = math.hypot(*rms_error(other.play(event.recording, event.start).power, event))
-    except CosimError:
-        return
     if left <= _LEAVES_ALONE * error:
         figures = {"seen": hertz, "rated": device.rated_hz, "error": error, "left": left}
         yield left / error, Question(QuestionKind.RATED_FREQUENCY, figures)

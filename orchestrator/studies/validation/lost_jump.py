@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers
-from orchestrator.core.errors import CosimError
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import (
     EventComparison,
@@ -117,7 +116,7 @@ def _tried(
     recording = near.recording
     lost = smoothing.lost(recording)
     part = min(1.0, _SMALL / max(float(np.abs(lost).max()), _SMALL))
-    try:
+    with device.trials.trial(f"an angle smoothed over {1000 * smoothing.length:g} ms"):
         moves = (device.play(_turned(recording, part * lost), near.start).power - base) / part
         off = recording.power - base
         good = recording.good
@@ -127,9 +126,7 @@ def _tried(
         if promised > _PROMISES * _rms(off[good]) or scale * smoothing.length < _SHORTEST:
             return
         power = device.play(_turned(recording, scale * lost), near.start).power
-    except CosimError:
-        return
-    yield math.hypot(*rms_error(power, near)), scale * smoothing.length, scale * lost
+        yield math.hypot(*rms_error(power, near)), scale * smoothing.length, scale * lost
 
 
 def _rms(values: Complex) -> float:

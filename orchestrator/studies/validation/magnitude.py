@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from orchestrator.core.arrays import Complex
-from orchestrator.core.errors import CosimError
 from orchestrator.studies.validation.event import EventComparison, RecordedEvent, cut_event
 from orchestrator.studies.validation.figures import signals_of
 from orchestrator.studies.validation.questions import Question, QuestionKind
@@ -38,11 +37,9 @@ def _from_the_other_side(comparison: EventComparison, role: str) -> Iterator[Que
     near = cut_event(comparison.event, _AFTER, _BEFORE)
     power = near.start.power
     turned = power.conjugate() if role == "q" else -power.conjugate()
-    try:
+    with comparison.device.trials.trial(f"{role.upper()} of the other sign before the event"):
         played = comparison.device.play(near.recording, replace(near.start, power=turned))
-    except CosimError:
-        return
-    yield from _question_of(near, role, played.power, comparison)
+        yield from _question_of(near, role, played.power, comparison)
 
 
 def _question_of(

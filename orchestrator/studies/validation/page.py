@@ -50,7 +50,7 @@ def validation_page(result: ValidationResult) -> str:
         chapters.append(("Two models of one plant", _beside(result)))
     if result.criteria:
         chapters.append(("Limits", _limits(result)))
-    if result.explanations:
+    if result.request.explain:
         chapters.append(("One cause that would explain the error", _explained(result)))
     if result.fit is not None:
         chapters.append(("Fit", _fit(result)))
@@ -63,7 +63,7 @@ def validation_page(result: ValidationResult) -> str:
     says += [f"{left}."] if left else []
     places = [one for one in result.apart if one.more_than_from_record]
     says += [difference_sentence(places)] if places else []
-    says += [explanation_sentence(result.explanations)] if result.explanations else []
+    says += [_causes_said(result)] if result.request.explain else []
     listed_says = "".join(f"<li>{escape(one)}</li>" for one in says)
     findings = f'<div class="findings"><ul>{listed_says}</ul></div>'
     return document(f"Validation of {device.name}", "by recordings", findings, chapters)
@@ -174,8 +174,14 @@ def _fit(result: ValidationResult) -> str:
 
 
 def _explained(result: ValidationResult) -> str:
-    said = f"<p>{escape(explanation_sentence(result.explanations))}</p>"
+    said = f"<p>{escape(_causes_said(result))}</p>"
+    if not result.explanations:
+        return said
     return said + explanation_table(result.explanations).html()
+
+
+def _causes_said(result: ValidationResult) -> str:
+    return explanation_sentence(result.explanations, finished=not result.interrupted)
 
 
 def _not_judged(result: ValidationResult) -> str:
@@ -188,6 +194,7 @@ def _not_judged(result: ValidationResult) -> str:
         texts.append("No parameter was fitted.")
     if not result.request.explain:
         texts.append("No cause of the errors was looked for.")
+    texts += [f"Tried, and it did not run: {one.tried} ({one.reason})." for one in result.refused]
     return bullet_list(texts)
 
 

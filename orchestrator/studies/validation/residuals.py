@@ -78,7 +78,8 @@ class Residuals:
             power = device.play(with_hidden(event.recording, unknown, values), event.start).power
         except InputError:
             raise
-        except CosimError:
+        except CosimError as error:
+            device.trials.note("values on the way of the fit", error)
             return np.full(stretch.size, _REFUSED)
         finally:
             self.runs += 1

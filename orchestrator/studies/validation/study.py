@@ -35,6 +35,7 @@ from orchestrator.studies.validation.limits import (
 )
 from orchestrator.studies.validation.parameters import Wanted, wanted_parameters
 from orchestrator.studies.validation.record import PortBases, read_recording
+from orchestrator.studies.validation.trials import RefusedTrial
 from orchestrator.studies.validation.windows import given_windows
 from orchestrator.studies.validation.words import sentence
 
@@ -99,12 +100,23 @@ class ValidationResult:
     confirmations: Sequence[FitCheck] = field(default=())
     explanations: Sequence[Explanation] = field(default=())
     others: Sequence[EventComparison] = field(default=())  # of the other model, in the same order
+    interrupted: bool = False  # before all that was asked for was done
 
     @property
     def devices(self) -> list[PlayedDevice]:
         """The model, and the other one of the plant where there is one."""
         both = (self.request.device, self.request.beside)
         return [one for one in both if one is not None]
+
+    @property
+    def finished(self) -> bool:
+        """Return whether all was done that was asked for."""
+        return not self.interrupted and (self.fit is None or self.fit.finished)
+
+    @property
+    def refused(self) -> list[RefusedTrial]:
+        """Readings, values and steps that were tried and did not run, with the reason."""
+        return [one for device in self.devices for one in device.trials.refused]
 
     @property
     def apart(self) -> list[WindowApart]:
@@ -166,9 +178,17 @@ def _validate(request: ValidationRequest, report: Report) -> ValidationResult:
     result = add_verdict(ValidationResult(request, comparisons, others=others))
     if request.explain:
         events = [one.event for one in result.comparisons]
-        found = explain_errors(request.device, events, report)
-        result = replace(result, explanations=found)
-    return add_fit(result, report) if request.fit else result
+        search = explain_errors(request.device, events, report)
+        result = replace(result, explanations=search.causes, interrupted=not search.finished)
+    return _with_fit(result, report) if request.fit and not result.interrupted else result
+
+
+def _with_fit(result: ValidationResult, report: Report) -> ValidationResult:
+    """The result with a fit; if that is interrupted before it has any values, without one."""
+    try:
+        return add_fit(result, report)
+    except KeyboardInterrupt:
+        return replace(result, interrupted=True)
 
 
 def _others(

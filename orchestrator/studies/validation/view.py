@@ -37,6 +37,7 @@ from orchestrator.studies.validation.words import (
     explanation_sentence,
     fit_sentence,
     open_sentence,
+    refused_sentence,
     sentence,
     swing_cell,
     untold_words,
@@ -97,6 +98,8 @@ class Validation:
             **self._beside_json(),
             **self._fit_json(),
             **self._explained_json(),
+            "refused": [one.as_json() for one in self.result.refused],
+            "finished": self.result.finished,
         }
 
     def _beside_json(self) -> dict[str, Any]:
@@ -241,8 +244,10 @@ def parts(found: Validation) -> Iterator[RenderableType]:
         yield beside_table(result)
     if result.criteria:
         yield _worst_criteria(result.criteria)
+    if result.request.explain:
+        said = explanation_sentence(result.explanations, finished=not result.interrupted)
+        yield escape(said)
     if result.explanations:
-        yield escape(explanation_sentence(result.explanations))
         yield explanation_table(result.explanations[:_SHOWN])
     if result.fit is not None:
         yield _fit_table(result.fit)
@@ -250,6 +255,10 @@ def parts(found: Validation) -> Iterator[RenderableType]:
         yield escape(
             fit_sentence(result.fit, [c.recording for c in result.confirmations if not c.fitted])
         )
+    elif result.request.fit and result.interrupted:
+        yield "Interrupted before a fit had any values: the figures above are of the recordings alone."
+    if result.refused:
+        yield escape(refused_sentence(result.refused))
 
 
 def _differences(result: ValidationResult) -> Iterator[str]:

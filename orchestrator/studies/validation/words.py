@@ -14,6 +14,7 @@ from orchestrator.studies.validation.fit import Fit, FittedParameter, Untold
 from orchestrator.studies.validation.limits import Criterion, LimitVerdict, OpenCause
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.swing import PlantSwing, swings_of
+from orchestrator.studies.validation.trials import RefusedTrial
 
 Figures = Mapping[str, Any]
 
@@ -375,6 +376,8 @@ def untold_words(one: FittedParameter) -> str:
             return "no: it acts faster than the samples"
         case Untold.AT_BOUND:
             return "no: it ends at its bound"
+        case Untold.NO_BETTER:
+            return "no: no value that was found leaves clearly less of the error"
         case Untold.WIDE:
             return "no: its interval is as large as itself"
 
@@ -504,8 +507,17 @@ def explanation_cells(one: Explanation) -> tuple[str, ...]:
     )
 
 
-def explanation_sentence(explanations: Sequence[Explanation]) -> str:
-    """Name the cause that explains the most, and those that explain nearly as much."""
+def explanation_sentence(explanations: Sequence[Explanation], *, finished: bool = True) -> str:
+    """Name the cause that explains the most, and those that explain nearly as much.
+
+    ``finished``: whether all causes were tried."""
+    said = _said_of_causes(explanations)
+    return said if finished else f"Interrupted before all causes were tried. {said}"
+
+
+def _said_of_causes(explanations: Sequence[Explanation]) -> str:
+    if not explanations:
+        return "No cause that was tried leaves less of the error."
     best = explanations[0]
     if not best.explains:
         return (
@@ -536,6 +548,12 @@ def _cause(one: Explanation) -> str:
             return f"a current that the plant limits to {one.value:.4g}{unit}"
         case _:
             return f"{one.name} = {value_text(one.value)}{unit}{beside} (now {value_text(one.now)})"
+
+
+def refused_sentence(refused: Sequence[RefusedTrial]) -> str:
+    """Name what was tried and did not run."""
+    names = "; ".join(one.tried for one in refused)
+    return f"Tried, and the device did not run so: {names}. --json and the page say why."
 
 
 def fit_sentence(fit: Fit, kept_back: Sequence[str]) -> str:

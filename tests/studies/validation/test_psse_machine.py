@@ -110,6 +110,36 @@ def test_the_parameters_of_pss_es_machine_are_found_again(case, recording):
         assert row.value == pytest.approx(truth[row.parameter], rel=0.02)
 
 
+def fitted(case, recording, inertia, **more):
+    """The one parameter of a fit that begins at an inertia."""
+    values = {"machine.machine.H": inertia}
+    (row,) = validated(case, recording, values=values, **more).as_json()["fit"]
+    return row
+
+
+def test_an_inertia_is_found_from_six_times_its_value(case, recording):
+    """Slopes alone end at 147 s, with an interval from 63 to 231."""
+    row = fitted(case, recording, 40.0, fit="machine.H")
+    assert row["identifiable"]
+    assert row["low"] < 6.175 < row["high"]
+    assert row["high"] - row["low"] < 0.1
+
+
+def test_a_fit_that_finds_nothing_better_is_told_and_shows_no_interval(case, recording):
+    """The inertia is wrong, and an exciter's time constant is fitted in its place."""
+    row = fitted(case, recording, 40.0, fit="exciter.T_B")
+    assert row["why_not"] == "no better than the start"
+    assert row["value"] == row["start"] == 5.0
+    assert (row["low"], row["high"], row["identifiable"]) == (None, None, False)
+
+
+def test_a_fit_that_stands_on_a_bound_is_told_and_shows_no_interval(case, recording):
+    row = fitted(case, recording, 20.0, fit="machine.H", bounds={"machine.H": (7.0, 30.0)})
+    assert row["why_not"] == "at its bound"
+    assert row["value"] == pytest.approx(7.0, abs=1e-3)
+    assert (row["low"], row["high"]) == (None, None)
+
+
 SPOILT = {
     "P and Q exchanged": (
         lambda f: f.assign(p_mw=f.q_mvar, q_mvar=f.p_mw),
