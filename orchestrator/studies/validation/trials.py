@@ -24,7 +24,7 @@ class RefusedTrial:
 
 @dataclass
 class TrialLog:
-    """What was tried with a device and did not run, each once, in the order of the trials."""
+    """The trials with a device that did not run, each once, in their order."""
 
     _by_name: dict[str, RefusedTrial] = field(default_factory=dict)
 
