@@ -157,14 +157,32 @@ def _require_within(m: ModelBuilder, p: Given, flags: Mapping[str, Expr], seen: 
     current = sqrt(seen.active_0**2 + seen.reactive_0**2)
     generates, trips = flags["GenFlag"], flags["VtripFlag"]
     for margin, text in (
-        (p.Pmax - seen.P_0, "more active power than Pmax: lower P_0, or raise Pmax"),
-        (seen.P_0 - p.Pmin, "less active power than Pmin: raise P_0, or lower Pmin"),
-        (p.Imax - current, "more current than Imax at v_0: raise S_n or Imax, or lower P_0 or Q_0"),
-        (if_else(generates, seen.P_0, 1), "that it draws power: raise P_0, or GenFlag = false"),
-        (if_else(trips, seen.v_0 - p.vl1, 1), "a voltage below vl1, where a share is off"),
-        (if_else(trips, p.vh1 - seen.v_0, 1), "a voltage above vh1, where a share is off"),
+        (
+            p.Pmax - seen.P_0,
+            "the power flow asks for more active power than Pmax: lower P_0, or raise Pmax",
+        ),
+        (
+            seen.P_0 - p.Pmin,
+            "the power flow asks for less active power than Pmin: raise P_0, or lower Pmin",
+        ),
+        (
+            p.Imax - current,
+            "P_0 and Q_0 ask for more than Imax at v_0: raise S_n or Imax, or lower them",
+        ),
+        (
+            if_else(generates, seen.P_0, 1),
+            "P_0 draws power, and GenFlag says that it generates: raise P_0, or set GenFlag = false",
+        ),
+        (
+            if_else(trips, seen.v_0 - p.vl1, 1),
+            "v_0 lies below vl1, where a share is off: raise v_0, or lower vl1",
+        ),
+        (
+            if_else(trips, p.vh1 - seen.v_0, 1),
+            "v_0 lies above vh1, where a share is off: lower v_0, or raise vh1",
+        ),
     ):
-        m.require(margin + ROUNDING, f"the power flow asks for {text}")
+        m.require(margin + ROUNDING, text)
 
 
 def declare_parameters(m: ModelBuilder) -> Given:

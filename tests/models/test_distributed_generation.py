@@ -255,9 +255,9 @@ def test_the_active_current_comes_back_by_its_ramp():
     [
         ({"P_0": 1.1, "Imax": 2.0}, "more active power than Pmax"),
         ({"Pmin": 0.7}, "less active power than Pmin"),
-        ({"Imax": 0.5}, "more current than Imax"),
-        ({"vl1": 1.01, "vl0": 0.9}, "a voltage below vl1"),
-        ({"vh1": 0.99}, "a voltage above vh1"),
+        ({"Imax": 0.5}, "more than Imax"),
+        ({"vl1": 1.01, "vl0": 0.9}, "v_0 lies below vl1"),
+        ({"vh1": 0.99}, "v_0 lies above vh1"),
     ],
 )
 def test_a_start_beyond_a_limit_is_refused(values, rule):
