@@ -172,7 +172,9 @@ class CaseText:
             source=_quoted(", ".join(path.name for path in self._sources.values())),
             models=both if w.device is None else "",
             step=steps[kind],
-            record=', "grid.line_*.p"' * lines + "".join(f', "{place.name}.*"' for place in places),
+            record=', "grid.*.fault.*"' * bool(self._fault_bus)
+            + ', "grid.line_*.p"' * lines
+            + "".join(f', "{place.name}.*"' for place in places),
             other=rest + stray[other] if w.device is None else "",
             slack=(f"\nslack = {_quoted(w.slack)}" if w.slack else "")
             + "\nreactive_limits = true" * w.reactive_limits,
