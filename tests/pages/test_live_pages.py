@@ -26,7 +26,7 @@ def test_the_guide_leads_to_every_page_and_says_how_it_was_made():
     text = GUIDE.read_text(encoding="utf-8")
     for path in PAGES:
         assert path in led
-        assert re.search(rf"--(save|html) \.docs/live/{re.escape(path.name)}[\n`]", text)
+        assert re.search(rf"--(save|html|out) \.docs/live/{re.escape(path.name)}[\n`]", text)
 
 
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: path.stem)

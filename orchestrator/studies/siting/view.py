@@ -108,6 +108,11 @@ def device_title(result: SiteResult) -> str:
 
 
 def answer(result: SiteResult) -> str:
+    return "".join(answer_in_parts(result))
+
+
+def answer_in_parts(result: SiteResult) -> tuple[str, str]:
+    """Return the answer, and behind it what the other places bring and how the places were put in order."""
     best = result.ranking[:3]
     most, at = result.least(best[0])
     mode = next(one for one in result.situations if one.name == at).modes[0]
@@ -115,19 +120,22 @@ def answer(result: SiteResult) -> str:
     if max(result.least(bus)[0] for bus in result.ranking) < (
         0 if result.request.is_foreign else _NONE
     ):
-        return f"no bus is a place for {device_title(result)}: it does not help the mode {_called(mode)}{after}"
+        return (
+            f"no bus is a place for {device_title(result)}: it does not help the mode {_called(mode)}{after}",
+            "",
+        )
     among = " of those asked for" if result.request.buses else ""
     if result.by_coupled:
         return _best_confirmed(result, among)
     others = ", ".join(f"{bus} {100 * result.least(bus)[0] / most:.0f} %" for bus in best[1:])
     return (
         f"{best[0]} is the best place for {device_title(result)}{among}: {shift_text(result, most)} "
-        f"{unit(result, '100')}, for the least damped mode{after} ({_called(mode)})"
-        + (f"; of that {others}" if others else "")
+        f"{unit(result, '100')}, for the least damped mode{after} ({_called(mode)})",
+        f"; of that {others}" if others else "",
     )
 
 
-def _best_confirmed(result: SiteResult, among: str) -> str:
+def _best_confirmed(result: SiteResult, among: str) -> tuple[str, str]:
     """The best of the places that coupled FMUs confirm, by the damping of the least damped mode there."""
     first, *others = [one for one in result.confirmations if not one.failure]
     seen = result.intact.modes[0]
@@ -140,9 +148,15 @@ def _best_confirmed(result: SiteResult, among: str) -> str:
     mode = f"the mode {title_of_mode(seen.label, seen.mode)}, the least damped without it"
     reached = f"{steps} for {mode}, with {_rated(result)}{pod}"
     return (
-        f"{first.bus} is the best place for {device_title(result)}{among}: {reached}{_lowered(result, first)}; then "
-        f"{then}: {order}. By {unit(result, '100')} it is {small}"
+        f"{first.bus} is the best place for {device_title(result)}{among}: {reached}{_lowered(result, first)}",
+        f"; then {then}: {order}. By {unit(result, '100')} it is {small}",
     )
+
+
+def _as_sentence(part: str) -> str:
+    """Let a part behind a semicolon stand alone."""
+    text = part.removeprefix("; ")
+    return text[:1].upper() + text[1:]
 
 
 def _lowered(result: SiteResult, first: Confirmation) -> str:
@@ -447,8 +461,10 @@ def _page(result: SiteResult) -> str:
     told = sureness(result)
     beside = told[: len(told) - max(1, len(result.confirmations))] if result.confirmations else told
     lines = "".join(f"<li>{escape(text)}</li>" for text in (*beside, *remarks(result)))
+    first, further = answer_in_parts(result)
+    behind = f"<p>{escape(_as_sentence(further))}</p>" if further else ""
     findings = (
-        f'<div class="findings"><p class="verdict"><b class="{shade}">{escape(answer(result))}</b></p>'
+        f'<div class="findings"><p class="verdict"><b class="{shade}">{escape(first)}</b></p>{behind}'
         f'{_confirmed_table(result)}<ul class="soft">{lines}</ul></div>'
     )
     content = [("Map", "".join(_map(result, seen, figures) for seen in result.intact.modes[:3]))]

@@ -296,7 +296,7 @@ def test_a_runs_row_says_what_was_given_and_which_models_were_run(gfor, tmp_path
     assert (
         "SG + GFOR, with fault &quot;bus_2, 5 ms, from 2 ms&quot;, models = emt: not known" in text
     )
-    assert "<li>How sure: emt models, loads constant impedance" in text
+    assert "<li>How sure: EMT models, loads constant impedance" in text
     assert "phasor models; modes" not in text
 
 
@@ -578,7 +578,7 @@ def test_rows_of_other_networks_or_models_are_told_above_them(tmp_path, other, s
     assert len(found) == bool(said)
     assert re.search(said, "".join(found))
     assert ("one study" in text) == bool(said)
-    assert "emt models, loads constant power; " in text
+    assert "EMT models, loads constant power; " in text
 
 
 def test_a_fault_has_a_question_of_its_own(tmp_path):
@@ -692,7 +692,7 @@ def test_every_row_says_what_was_given_and_of_which_models(tmp_path):
     for name in kinds:
         assert f"gfor {name} own.toml --set models=emt --parameters p.toml</span>" in text
         assert f"is {name} meant?" in text
-    assert text.count("emt models; ") == len(kinds)
+    assert text.count("EMT models; ") == len(kinds)
     assert "--out" not in text[: text.index("<section")]
 
 

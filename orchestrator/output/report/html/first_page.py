@@ -20,14 +20,12 @@ _LONGEST = 240
 
 
 def first_page(chapters: Sequence[Chapter]) -> str:
-    """Return the verdicts by scenario, then the answers of all other studies in one table."""
+    """Return the verdicts by scenario, then the answers of all other studies: one as a sentence, several in a table."""
     open_ = Counter(text for one in chapters for text in dict.fromkeys(one.not_judged))
     shared = [text for text, count in open_.items() if count > 1]
     notes = {text: f"note {k}" for k, text in enumerate(shared, start=1)}
     by_scenario = "".join(_of_scenarios(one, notes) for one in chapters if one.lines)
-    others = [_row(one, notes) for one in chapters if not one.lines]
-    columns = ["Question", "Answer", "How sure", "Not judged"]
-    in_short = table("In short", columns, others, left=4) if others else ""
+    in_short = _short_answers([one for one in chapters if not one.lines], notes)
     below = "".join(
         f"<p>{name[0].upper()}{name[1:]}: {escape(short(text, _LONGEST))}</p>"
         for text, name in notes.items()
@@ -35,17 +33,36 @@ def first_page(chapters: Sequence[Chapter]) -> str:
     return f'<div class="answers">{by_scenario}{in_short}{below}</div>'
 
 
+def _short_answers(chapters: Sequence[Chapter], notes: dict[str, str]) -> str:
+    match chapters:
+        case []:
+            return ""
+        case [alone]:
+            shade, answer = SHADES[alone.good], escape(alone.answer)
+            verdict = (
+                f'<p class="verdict"><b class="{shade}">{answer[:1].upper()}{answer[1:]}</b></p>'
+            )
+            return _answer_with_notes(alone, verdict, notes)
+        case _:
+            columns = ["Question", "Answer", "How sure", "Not judged"]
+            return table("In short", columns, [_row(one, notes) for one in chapters], left=4)
+
+
 def _of_scenarios(chapter: Chapter, notes: dict[str, str]) -> str:
-    """Return a study of scenarios: its question, the verdicts, and in short notes below how sure they are."""
     beside = "".join(f"<p>{escape(text)}</p>" for text in chapter.beside)
+    return _answer_with_notes(chapter, f"{verdicts(chapter.lines)}{beside}", notes)
+
+
+def _answer_with_notes(chapter: Chapter, answer: str, notes: dict[str, str]) -> str:
+    """Return a study's question, its answer, and in short notes below how sure that is."""
     below = [
         ("How sure", escape(short(chapter.sure, 2 * _LONGEST))),
         ("Not judged", "; ".join(_not_judged(chapter, notes))),
         ("Results", escape(", ".join(_places_and_options(chapter)))),
     ]
-    told = "".join(f"<li>{name}: {text}</li>" for name, text in below)
+    told = "".join(f"<li>{name}: {text}</li>" for name, text in below if text)
     question = f'<p class="question">{escape(chapter.question)}</p>'
-    return f'{question}{verdicts(chapter.lines)}{beside}<ul class="soft">{told}</ul>'
+    return f'{question}{answer}<ul class="soft">{told}</ul>'
 
 
 def _row(chapter: Chapter, notes: dict[str, str]) -> list[str]:

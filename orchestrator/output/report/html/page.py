@@ -90,9 +90,7 @@ def page(
         content.insert(0, ("What changed since", changes(against, before, chapters)))
     content.append(("Provenance", origins(chapters) + "".join(map(sections.provenance, runs))))
     case = runs[0].case if runs else None
-    title = title or (
-        case.table.title or case.name if case else f"Report on {', '.join(map(_name, places))}"
-    )
+    title = title or (case.table.title or case.name if case else _title_of(places, headings))
     kind = "Small-signal and time-domain study by co-simulation of FMUs"
     found = "".join(map(sections.findings, runs))
     of_all = {
@@ -105,6 +103,11 @@ def page(
     above = "".join(paragraphs(False, [text]) for text in (differ, changed) if text)
     findings = above + first_page(chapters) + picture + found + answers
     return document(title, kind, findings, content, names=_names_of(chapters, runs))
+
+
+def _title_of(places: Sequence[Path], headings: Sequence[str]) -> str:
+    """Name a page without a run: by its one study, or by where the results lie."""
+    return headings[0] if len(headings) == 1 else f"Report on {', '.join(map(_name, places))}"
 
 
 def _names_of(chapters: Sequence[Chapter], runs: Sequence[Results]) -> ElementNames:

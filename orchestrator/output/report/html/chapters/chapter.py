@@ -17,6 +17,9 @@ from orchestrator.output.report.html.verdict_lines import VerdictLine
 _FASTEST = -5.0
 """Real part [1/s] of the fastest modes on a map: faster ones are over before a swing has begun."""
 
+_KINDS = {"emt": "EMT"}
+"""Kinds of models as sentences have them, where a table has another name."""
+
 Content = Mapping[str, Any]
 """A study's JSON."""
 
@@ -75,7 +78,7 @@ def kinds_of(records: Sequence[Content]) -> list[str]:
     loads = (one.get("basis", {}).get("loads") for one in records)
     return list(
         dict.fromkeys(
-            f"{one['models']} models" + (f", loads {law}" if law else "")
+            f"{_KINDS.get(one['models'], one['models'])} models" + (f", loads {law}" if law else "")
             for one, law in zip(records, loads, strict=True)
             if one.get("models")
         )

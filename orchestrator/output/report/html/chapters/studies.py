@@ -24,7 +24,7 @@ from orchestrator.output.report.html.least_damped import LeastDamped
 _SHOWN = 4
 """Parameters that an answer names and a picture shows: the strongest ones."""
 
-_DESIGNED = {"without": "target", "predicted": "predicted", "with": "achieved"}
+_DESIGNED = {"without the controller": "target", "predicted": "predicted", "with it": "achieved"}
 
 
 def of_screening(file: Path, c: Content) -> Chapter:
