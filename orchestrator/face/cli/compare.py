@@ -34,13 +34,13 @@ def run(options: argparse.Namespace) -> int:
         return 0
     columns = (
         "Signal",
-        "Deviation A",
-        "Deviation B",
-        "Largest difference",
+        "Farthest from its start: A",
+        "B",
+        "Largest difference of A and B",
         "at [s]",
-        "RMS",
-        "A rings",
-        "B rings",
+        "RMS of the difference",
+        "Strongest oscillation in A",
+        "in B",
     )
     rows = [
         (
