@@ -36,10 +36,17 @@ def run(options: argparse.Namespace) -> int:
             f"{options.case}: a study has its own values and range, and is not saved as a page; --set, "
             "--range and --save go with a case"
         )
-    name = options.scenario or kind.get("scenario", first_shown(case))
-    if name not in case.scenarios:
+    names = options.scenario or [kind.get("scenario", first_shown(case))]
+    unknown = [name for name in names if name not in case.scenarios]
+    if unknown:
         raise InputError(
-            f"--scenario: there is no scenario {name!r}; the case has: {', '.join(case.scenarios)}"
+            f"--scenario: there is no scenario {unknown[0]!r}; the case has: {', '.join(case.scenarios)}"
+        )
+    name, *further = dict.fromkeys(names)
+    if further and options.save is None:
+        raise InputError(
+            "--scenario: the page has all scenarios to choose from; name the one that is shown first, or give --save "
+            "FILE.html, whose page has those that are named"
         )
     values = kind.get("values", {}) | values_set(options)
     beginning = (
@@ -55,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
         desk = Desk(word, options.trust_fmus)
         with shown_progress("Points", shown=True) as report, catch_warnings():
             simplefilter("ignore", UnusualDataWarning)  # the page has them
-            save_page(options.save, case, desk, beginning, options.vary, report)
+            save_page(options.save, case, desk, beginning, options.vary, report, further=further)
         print(f"Written: {options.save}")
         return 0
     if options.vary:

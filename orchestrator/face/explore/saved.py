@@ -4,6 +4,7 @@ import itertools
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -33,12 +34,65 @@ def save_page(
     beginning: Mapping[str, Any],
     varied: Sequence[Vary],
     report: CountReport,
+    *,
+    further: Sequence[str] = (),
 ) -> None:
     """Compute the modes over the grid, and write the page; a scenario's other values are those it begins with.
 
     Without ``varied`` it has the sliders of the first screen, each of which moves alone from the case's values. Between
-    neighbours a value in the middle is computed as well: it tells how far a straight line is off there."""
+    neighbours a value in the middle is computed as well: it tells how far a straight line is off there. ``further``
+    scenarios stand beside that of the beginning, with the same sliders."""
     check_page(path)
+    if further and not varied:
+        raise InputError(
+            "several scenarios of a saved page have the same sliders; name them by --vary, or give one --scenario"
+        )
+    names = [str(beginning["scenario"]), *further]
+    begun = [{**beginning, "scenario": name} for name in names]
+    plans = [_plan_of(case, desk, one, varied, len(names)) for one in begun]
+    if sum(len(plan.points) for plan in plans) > _MOST:
+        count = len(plans[0].points)
+        of_each = f" for each of {len(plans)} scenarios" if further else ""
+        raise InputError(
+            f"--vary: the grid has {count} points{of_each}, and a saved page at most {_MOST}; give fewer values"
+        )
+    held = _Held(report, sum(len(plan.points) + len(plan.cells) for plan in plans))
+    for plan in plans:
+        held.compute(plan)
+    opened = desk.answer({"ask": "open"}, _nobody)
+    shown = [_shown_of(plan, held.answers) for plan in plans]
+    content = {
+        "beginning": beginning,
+        "open": {**opened, "scenarios": {name: opened["scenarios"][name] for name in names}},
+        "parameters": {plan.name: plan.parameters for plan in plans},
+        "flows": held.flows,
+        "answers": held.answers,
+        "cells": held.cells,
+        **shown[0],
+    }
+    if further:
+        content["others"] = dict(zip(further, shown[1:], strict=True))
+    write_text(path, whole_page(content))
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """The part of a page that is of one scenario, and what is to be computed for it."""
+
+    name: str
+    parameters: Mapping[str, Any]  # as the page has them
+    grid: Mapping[str, Sequence[float]]  # values of each slider
+    own: Mapping[str, float]  # the case's value of each
+    first: Mapping[str, Any]  # what the first screen has beside the modes
+    points: Sequence[Mapping[str, float]]
+    cells: Sequence[Mapping[str, tuple[float, float]]]
+    alone: bool  # each slider moves alone, from the case's values
+    computed: Callable[[Mapping[str, float]], dict[str, Any]]
+
+
+def _plan_of(
+    case: Case, desk: Desk, beginning: Mapping[str, Any], varied: Sequence[Vary], scenarios: int
+) -> _Plan:
     name, values = str(beginning["scenario"]), dict(beginning["values"])
     prepared = case.scenario(name, values).prepared
     axes = [resolve(vary, [prepared]) for vary in varied]
@@ -55,10 +109,6 @@ def save_page(
     own = _own_values(axes, known)
     grid = {axis.key: _with_own(axis.values, own.get(axis.key)) for axis in axes}
     points = [dict(zip(grid, chosen, strict=True)) for chosen in itertools.product(*grid.values())]
-    if len(points) > _MOST:
-        raise InputError(
-            f"--vary: the grid has {len(points)} points, and a saved page at most {_MOST}; give fewer values"
-        )
     first: dict[str, Any] = {}
     if varied:
         first["first"] = _answered(desk, {**asked, "values": values, "ask": "first"})
@@ -75,73 +125,71 @@ def save_page(
             given |= setters[key](x) if key in setters else {key: x}
         return desk.answer({**asked, "ask": "modes", "values": given}, _nobody)
 
-    cells = (
-        cells_of(grid) if varied else [one for key in grid for one in cells_of({key: grid[key]})]
-    )
-    held = _Held(name, computed, report, len(points) + len(cells))
-    for point in points:
-        held.compute(point, may_fail=not varied and bool(point))
-    for cell in cells:
-        held.judge(cell, {} if varied else own)
-    opened = desk.answer({"ask": "open"}, _nobody)
     listed = {one["parameter"] for one in parameters.get("parameters", ())}
     added = [_as_parameter(axis, grid[axis.key], own) for axis in axes if axis.key not in listed]
-    kept = smaller_parameters(parameters, [*grid])
+    kept = smaller_parameters(parameters, [*grid], scenarios)
     kept["parameters"] = [*kept.get("parameters", ()), *added]
-    content = {
-        "beginning": beginning,
-        "open": {**opened, "scenarios": {name: opened["scenarios"][name]}},
-        "parameters": {name: kept},
-        "grid": grid if varied else _values_with_answers(grid, own, held.answers),
-        "own": own,
-        "flows": held.flows,
-        "answers": held.answers,
-        "cells": held.cells,
-        **rounded(first),
-    }
-    write_text(path, whole_page(content))
+    alone = [one for key in grid for one in cells_of({key: grid[key]})]
+    cells = cells_of(grid) if varied else alone
+    return _Plan(
+        name=name,
+        parameters=kept,
+        grid=grid,
+        own=own,
+        first=first,
+        points=points,
+        cells=cells,
+        alone=not varied,
+        computed=computed,
+    )
+
+
+def _shown_of(plan: _Plan, answers: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return what the page has for each scenario: its sliders' values, the case's own, and the first screen."""
+    own = [one for one in answers if one["scenario"] == plan.name]
+    grid = _values_with_answers(plan.grid, plan.own, own) if plan.alone else plan.grid
+    return {"grid": grid, "own": plan.own, **rounded(plan.first)}
 
 
 class _Held:
     """The answers and cells that a page holds, as they are computed."""
 
-    def __init__(
-        self,
-        scenario: str,
-        computed: Callable[[Mapping[str, float]], dict[str, Any]],
-        report: CountReport,
-        count: int,
-    ) -> None:
+    def __init__(self, report: CountReport, count: int) -> None:
         self.answers: list[dict[str, Any]] = []
         self.flows: list[Any] = []
         self.cells: list[dict[str, Any]] = []
-        self._scenario, self._computed, self._report = scenario, computed, report
+        self._report = report
         self._done, self._count = 0, count
 
-    def compute(self, point: Mapping[str, float], *, may_fail: bool) -> None:
-        """Add the answer at a point; one that ``may_fail`` is left out where the case has none."""
-        self._tell()
-        try:
-            answer = smaller_answer(self._computed(point), self.flows)
-        except CosimError:
-            if not may_fail:
-                raise
-            return
-        self.answers.append({"scenario": self._scenario, "values": point, "answer": answer})
+    def compute(self, plan: _Plan) -> None:
+        """Add the answers of a scenario, and the cells whose corners have answers.
 
-    def judge(self, cell: Mapping[str, tuple[float, float]], own: Mapping[str, float]) -> None:
-        """Add a cell whose corners have answers; ``own``: the values of which an answer names none."""
+        A point of a slider that moves alone is left out where the case has no answer."""
+        for point in plan.points:
+            self._tell()
+            try:
+                answer = smaller_answer(plan.computed(point), self.flows)
+            except CosimError:
+                if not plan.alone or not point:
+                    raise
+                continue
+            self.answers.append({"scenario": plan.name, "values": point, "answer": answer})
+        for cell in plan.cells:
+            self._judge(plan, cell)
+
+    def _judge(self, plan: _Plan, cell: Mapping[str, tuple[float, float]]) -> None:
         self._tell()
-        points = [one["values"] for one in self.answers]
+        own = plan.own if plan.alone else {}  # the values of which an answer names none
+        points = [(one["scenario"], one["values"]) for one in self.answers]
         corners = [
-            {key: x for key, x in corner.items() if own.get(key) != x}
+            (plan.name, {key: x for key, x in corner.items() if own.get(key) != x})
             for corner in corners_of(cell)
         ]
         if all(corner in points for corner in corners):
             places = [points.index(corner) for corner in corners]
             answers = [one["answer"] for one in self.answers]
-            judged = judged_cell(cell, places, answers, self._computed)
-            self.cells += [] if judged is None else [judged]
+            judged = judged_cell(cell, places, answers, plan.computed)
+            self.cells += [] if judged is None else [{**judged, "scenario": plan.name}]
 
     def _tell(self) -> None:
         self._done += 1

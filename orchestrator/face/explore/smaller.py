@@ -54,14 +54,29 @@ def rounded(content: Any, digits: int = _DIGITS) -> Any:
     return content
 
 
-def smaller_parameters(answer: Mapping[str, Any], shown: Sequence[str]) -> dict[str, Any]:
-    """Leave out the parameters of a large case that are neither ``shown`` nor a switch that is off."""
-    rows = answer.get("parameters", [])
-    if len(rows) <= _LISTED:
-        return dict(answer)
+def smaller_parameters(
+    answer: Mapping[str, Any], shown: Sequence[str], scenarios: int = 1
+) -> dict[str, Any]:
+    """Leave out units that are out of service, which no page can put back, and of a large case the parameters that are
+    neither ``shown`` nor a switch that is off. Large is what is so with those of all ``scenarios``."""
+    rows, diagram = answer.get("parameters", []), answer.get("diagram")
+    if diagram is not None:
+        off = {row["parameter"] for row in rows if row["value"] is False}
+        out = [unit["name"] for unit in diagram["units"] if unit["out"] in off]
+        units = [unit for unit in diagram["units"] if unit["name"] not in out]
+        answer = {**answer, "diagram": {**diagram, "units": units}}
+        rows = [row for row in rows if not _belongs(row["parameter"], out)]
+    if len(rows) * scenarios <= _LISTED:
+        return {**answer, "parameters": rows}
     switches = {one for row in rows if row["parameter"] in shown for one in row["switches"]}
     wanted = {*shown, *switches}
     return {
         **answer,
         "parameters": [row for row in rows if row["parameter"] in wanted or row["value"] is False],
     }
+
+
+def _belongs(parameter: str, units: Sequence[str]) -> bool:
+    """Return whether a parameter is one of these units, or the network's for one of them."""
+    component, *parts = parameter.split(".")
+    return component in units or (bool(parts) and parts[0] in units)

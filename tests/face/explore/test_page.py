@@ -532,3 +532,29 @@ def test_ten_thousand_drags_leave_the_memory_flat(view, two_area):
     before, after = dragged(view, worker)
     assert after[0] - before[0] < 2  # [MB]
     assert after[1] - before[1] < 2
+
+
+def test_a_saved_page_of_several_scenarios_says_which_damps_most(browser, tmp_path, capsys):
+    page, named = tmp_path / "page.html", ["--scenario", "gfor", "--scenario", "pod_p"]
+    words = ["explore", "two_area", *named, "--vary", "gfor.pod_p.K=100,200"]
+    assert main(words) == 2
+    assert "give --save FILE.html" in " ".join(capsys.readouterr().err.split())
+    assert main([*words, "--save", str(page)]) == 0
+    with opened(browser, page.as_uri()) as view:
+        found = {}
+        for name, title in {"gfor": "SG + GFOR", "pod_p": "SG + GFOR POD-P"}.items():
+            view.locator("#scenario").select_option(name)
+            capsys.readouterr()
+            assert main(["modes", "two_area", "--scenario", name, "--json"]) == 0
+            content = json.loads(capsys.readouterr().out)["scenarios"][0]
+            view.get_by_text(f"{title}: stable").wait_for()
+            assert [row[:2] for row in rows(view)] == shown(content["modes"])
+            found[name] = min(mode["damping_percent"] for mode in content["modes"])
+        view.locator("#scenario").select_option("gfor")
+        view.get_by_role("button", name="Which scenario damps most?").click()
+        said = view.locator("#else-said").inner_text()
+        assert "Of 2 scenarios at these values, SG + GFOR POD-P damps most: " in said
+        assert f"{found['pod_p']:.2f} %" in said
+        assert f"SG + GFOR, {found['gfor']:.2f} %" in said
+        view.get_by_role("button", name="show it").click()
+        view.get_by_text("SG + GFOR POD-P: stable").wait_for()

@@ -150,3 +150,80 @@ def test_of_many_parameters_a_page_keeps_those_of_its_sliders_and_what_is_off():
     rows += [{"parameter": "a.x", "value": 1.0, "switches": ["a.p7"]}]
     kept = smaller_parameters({"parameters": rows}, ["a.x"])["parameters"]
     assert [one["parameter"] for one in kept] == ["a.p7", "line.closed", "a.x"]
+
+
+def page_of_scenarios(monkeypatch, path, *names):
+    """Contents of a page of several scenarios. Each has a damping of its own, and its own value of the slider."""
+    kept = {}
+    monkeypatch.setattr(saved, "resolve", lambda vary, _: axis_of(vary, [1.0, 2.0]))
+    monkeypatch.setattr(saved, "whole_page", lambda content: kept.update(content) or "")
+
+    def answer(what, tell):
+        scenario = what.get("scenario")
+        if what["ask"] == "parameters":
+            return {"parameters": [{"parameter": "a.x", "value": {"a": 1.0, "b": 1.5}[scenario]}]}
+        if what["ask"] == "first":
+            return {"curves": {scenario: [[0.0], [1.0]]}}
+        if what["ask"] == "open":
+            return {"scenarios": {name: name.upper() for name in "abc"}}
+        return answer_of(complex(-0.1 * what["values"]["a.x"] * (1 + "ab".index(scenario)), 3.0))
+
+    case = SimpleNamespace(scenario=lambda name, values: SimpleNamespace(prepared=None))
+    beginning = {"scenario": names[0], "values": {}, "range": [0.1, 2.0]}
+    desk = SimpleNamespace(answer=answer)
+    saved.save_page(
+        path, case, desk, beginning, ["a.x"], lambda *count: None, further=list(names[1:])
+    )
+    return kept
+
+
+def test_several_scenarios_have_each_their_answers_cells_values_and_response(monkeypatch, tmp_path):
+    kept = page_of_scenarios(monkeypatch, tmp_path / "p.html", "a", "b")
+    assert kept["open"]["scenarios"] == {"a": "A", "b": "B"}
+    assert (kept["grid"], kept["own"]) == ({"a.x": [1.0, 2.0]}, {"a.x": 1.0})
+    other = kept["others"]["b"]
+    assert (other["grid"], other["own"]) == ({"a.x": [1.0, 1.5, 2.0]}, {"a.x": 1.5})
+    assert [[*one["first"]["curves"]] for one in (kept, other)] == [["a"], ["b"]]
+    assert kept["parameters"]["b"]["parameters"][0]["value"] == 1.5
+    real = {
+        (one["scenario"], one["values"]["a.x"]): one["answer"]["modes"]["scenarios"][0]["modes"][0]
+        for one in kept["answers"]
+    }
+    assert {key: mode["real"] for key, mode in real.items()} == pytest.approx(
+        {("a", 1.0): -0.1, ("a", 2.0): -0.2, ("b", 1.0): -0.2, ("b", 1.5): -0.3, ("b", 2.0): -0.4}
+    )
+    for cell in kept["cells"]:
+        corners = [kept["answers"][place] for place in cell["corners"]]
+        assert {one["scenario"] for one in corners} == {cell["scenario"]}
+        assert [one["values"]["a.x"] for one in corners] == list(cell["at"]["a.x"])
+    assert [cell["scenario"] for cell in kept["cells"]] == ["a", "b", "b"]
+
+
+def test_a_page_of_one_scenario_is_as_it_was(monkeypatch, tmp_path):
+    assert "others" not in page_of_scenarios(monkeypatch, tmp_path / "p.html", "a")
+
+
+def test_several_scenarios_need_the_same_sliders(tmp_path):
+    beginning = {"scenario": "a", "values": {}, "range": [0.1, 2.0]}
+    with pytest.raises(InputError, match="name them by --vary"):
+        saved.save_page(
+            tmp_path / "p.html", None, None, beginning, [], lambda *count: None, further=["b"]
+        )
+
+
+def test_a_page_has_no_unit_that_is_out_of_service():
+    names = ("a", "b")
+    units = [{"name": name, "out": f"{name}.connected"} for name in names]
+    rows = [
+        {"parameter": "a.connected", "value": True, "switches": []},
+        {"parameter": "a.K", "value": 1.0, "switches": []},
+        {"parameter": "b.connected", "value": False, "switches": []},
+        {"parameter": "b.K", "value": 1.0, "switches": []},
+        {"parameter": "grid.b.connected", "value": True, "switches": []},
+        {"parameter": "grid.line_b.connected", "value": True, "switches": []},
+    ]
+    kept = smaller_parameters({"parameters": rows, "diagram": {"units": units}}, [])
+    assert [one["name"] for one in kept["diagram"]["units"]] == ["a"]
+    listed = [one["parameter"] for one in kept["parameters"]]
+    assert listed == ["a.connected", "a.K", "grid.line_b.connected"]
+    assert smaller_parameters({"parameters": rows[:2]}, [], 600)["parameters"] == []

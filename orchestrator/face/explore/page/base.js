@@ -2,6 +2,13 @@
 // What all parts of the page share: its state, elements that are made from text alone, and questions to the server.
 const PAGE_ID = [...crypto.getRandomValues(new Uint8Array(9))].map(x => x.toString(36)).join("");
 const SAVED = document.getElementById("saved") ? JSON.parse(document.getElementById("saved").textContent) : null;
+// Of several scenarios in a saved page each has sliders' values, the case's own and a first screen.
+if (SAVED?.others) {
+  for (const key of ["grid", "own", "first"]) {
+    const ofTheFirst = SAVED[key];
+    Object.defineProperty(SAVED, key, { get: () => SAVED.others[state.scenario]?.[key] ?? ofTheFirst });
+  }
+}
 const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6d31", "#7f7f7f"];
 const SVG = "http://www.w3.org/2000/svg";
 

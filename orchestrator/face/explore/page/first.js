@@ -155,6 +155,7 @@ function paintQuestions() {
     const on = (state.values[off] ?? original(off)) !== false;
     add(`What does ${off.replace(/\.enabled$/, "")} do?`, () => withValues({ [off]: !on }, `${off} = ${!on}`));
   }
+  if (SAVED?.others) add("Which scenario damps most?", askBestScenario);
   for (const name of Object.keys(SAVED?.grid ?? {}).slice(0, 3)) add(`Which ${name} damps most?`, () => askBest(name));
   add("What is a mode?", whatAModeIs);
   $("questions").replaceChildren(...questions);

@@ -32,7 +32,7 @@ async function dragSaved(name, value) {
     seen.near = near;
     if (seen.dragged !== value) return;  // the slider went on
   }
-  const cell = SAVED.cells.find(one => Object.entries(one.at).every(([key, [low, high]]) => key in wanted && low <= wanted[key] && wanted[key] <= high));
+  const cell = SAVED.cells.find(one => (one.scenario ?? state.scenario) === state.scenario && Object.entries(one.at).every(([key, [low, high]]) => key in wanted && low <= wanted[key] && wanted[key] <= high));
   if (!cell || value === heldNear(name, value)) {
     if (seen.estimate) { seen.estimate = null; paintMap(); paintTable(); }
     paintVerdict();
@@ -74,13 +74,27 @@ function wordsOfError() {
   const sorted = key => SAVED.cells.map(one => one[key]).sort((a, b) => a - b), least = sorted("least"), most = sorted("most"), last = most.length - 1;
   return `While you drag, ≈ is interpolated: at ${most.length} values halfway, computed to know it, the least damped mode was off by ${number(least[last >> 1], 2)} points of damping as a rule and ${number(least[last], 2)} at most (any mode: ${number(most[last], 2)}). On release the nearest computed value is shown.`;
 }
-// A question that the answers of the page are enough for: which value of a slider damps most, the others as they are.
+// Damping of the least damped mode [%], below 0 where the system is unstable.
+function leastDampingOf(answer) {
+  const one = answer.modes.scenarios[0], damping = leastOf(one.modes).damping_percent;
+  return one.stable === false ? Math.min(-1e-9, damping) : damping;
+}
+// Questions that the answers of the page are enough for: which scenario damps most at the sliders' values, ...
+function askBestScenario() {
+  const values = Object.fromEntries(Object.keys(SAVED.grid).map(name => [name, heldNear(name, state.values[name] ?? ownOf(name))]));
+  const tried = SAVED.answers.filter(one => Object.entries(values).every(([name, v]) => one.values[name] === v) && leastOf(one.answer.modes.scenarios[0].modes));
+  const sorted = [...tried].sort((one, other) => leastDampingOf(other.answer) - leastDampingOf(one.answer)), titleOf = one => seen.titles[one.scenario] ?? one.scenario;
+  const show = make("button", {}, "show it");
+  show.addEventListener("click", () => { $("scenario").value = sorted[0].scenario; $("scenario").dispatchEvent(new Event("change")); });
+  const others = sorted.slice(1, Math.min(4, sorted.length - 1)).map(one => `${titleOf(one)} ${fixed(leastDampingOf(one.answer), 2)} %`);
+  sayElse(`Of ${tried.length} scenarios at these values, ${titleOf(sorted[0])} damps most: ${swingOf(sorted[0].answer)}; ${others.length ? `then ${others.join(", ")}; ` : ""}least does ${titleOf(sorted.at(-1))}, ${fixed(leastDampingOf(sorted.at(-1).answer), 2)} %. `, show);
+}
+// ... and which value of a slider damps most, the others as they are.
 function askBest(name) {
   const others = SAVED.movers ? {} : Object.fromEntries(Object.keys(SAVED.grid).map(one => [one, heldNear(one, state.values[one] ?? ownOf(one))]));
-  const answerAt = value => { const at = SAVED.movers && value === ownOf(name) ? {} : { ...others, [name]: value }; return SAVED.answers.find(one => Object.keys(one.values).length === Object.keys(at).length && Object.entries(at).every(([n, v]) => one.values[n] === v))?.answer; };
+  const answerAt = value => { const at = SAVED.movers && value === ownOf(name) ? {} : { ...others, [name]: value }; return SAVED.answers.find(one => one.scenario === state.scenario && Object.keys(one.values).length === Object.keys(at).length && Object.entries(at).every(([n, v]) => one.values[n] === v))?.answer; };
   const tried = SAVED.grid[name].map(value => ({ value, answer: answerAt(value) })).filter(one => one.answer && leastOf(one.answer.modes.scenarios[0].modes));
-  const damping = one => (one.answer.modes.scenarios[0].stable === false ? Math.min(-1e-9, leastOf(one.answer.modes.scenarios[0].modes).damping_percent) : leastOf(one.answer.modes.scenarios[0].modes).damping_percent);
-  const best = tried.reduce((one, other) => (damping(other) > damping(one) ? other : one)), unstable = tried.filter(one => one.answer.modes.scenarios[0].stable === false);
+  const best = tried.reduce((one, other) => (leastDampingOf(other.answer) > leastDampingOf(one.answer) ? other : one)), unstable = tried.filter(one => one.answer.modes.scenarios[0].stable === false);
   const show = make("button", {}, "show it");
   show.addEventListener("click", () => setSaved(name, best.value));
   const range = `${number(tried[0].value)} to ${number(tried.at(-1).value)}`;
