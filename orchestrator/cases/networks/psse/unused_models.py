@@ -80,7 +80,8 @@ def unused_models(
                 changes.note(record.line, remark)
     for record in _named_in(records, uses, RESTS):
         text = (
-            f"{record.name} is {RESTS}: it acts at limits only. Does the machine start within them?"
+            f"{record.name} is {RESTS}, as no public source has both its diagram and its record's fields: it acts at "
+            "limits only. Does the machine start within them?"
         )
         changes.note(record.line, Remark(text, RESTS))
     for record in _named_in(records, uses, UNHEARD):
