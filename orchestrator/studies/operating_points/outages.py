@@ -51,6 +51,15 @@ def read_outages(text: str | None, elements: Elements) -> list[Outage]:
             elements.file.identifier(one.strip(), elements.names, Option.OUTAGES) for one in parts
         )
         for one in lost:
+            line, at, _ = one.partition(" at ")
+            if at and line in elements.lines:
+                raise InputError(
+                    Option.OUTAGES
+                    + f": {one!r}: an outage opens a line at both ends. One end alone is a point's value: a column "
+                    f"{elements.grid}.{line}.from_connected (or to_connected) with false in the file of "
+                    + Option.POINTS
+                    + ", where an event of the case, a line_trip with 'at', opens that line at one end"
+                )
             if one not in elements.names:
                 hint = close_names(
                     one, elements.names, f"write {', '.join(_KINDS)}, or names of elements"
