@@ -1,9 +1,13 @@
 """An instance that is used for run after run gives what a new one gives, and is given back."""
 
+from dataclasses import replace
+from zipfile import ZipFile
+
 import numpy as np
 import pandas as pd
 import pytest
 
+from orchestrator.cases.scenario.catalogue_fmus import catalogue_fmu
 from orchestrator.face.api import validation as face
 from orchestrator.studies.validation import instances
 from orchestrator.studies.validation.event import prepare_event
@@ -44,3 +48,13 @@ def test_a_run_leaves_nothing_to_the_next_one(model, monkeypatch):
     assert np.array_equal(again, new)
     assert len(opened) == 2
     assert all(one._fmu is None for one in opened)
+
+
+def test_a_model_by_its_name_runs_without_python_and_gives_the_same_to_the_last_bit():
+    device = face._alone("gfor", None, {"S_n": 100.0}, 1e-4)
+    with ZipFile(device.path) as archive:
+        assert not [name for name in archive.namelist() if name.endswith(".py")]
+    seen = event()
+    of_python = replace(device, description=catalogue_fmu("gfor"))
+    powers = [one.play(seen.recording, seen.start).power for one in (device, of_python)]
+    assert np.array_equal(*powers)
