@@ -16,7 +16,9 @@ from orchestrator.studies.screening.summary import Summary
 def summary(*verdicts, complete=True):
     """Of items that are stable, unstable or without a verdict (None)."""
     records = [
-        SimpleNamespace(status=Status.COMPUTED, stable=v, zeros=0, critical=(), counted=True)
+        SimpleNamespace(
+            status=Status.COMPUTED, stable=v, zeros=0, critical=(), counted=True, run=None
+        )
         for v in verdicts
     ]
     items = [SimpleNamespace(record=record, trajectories=()) for record in records]
