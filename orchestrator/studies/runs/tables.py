@@ -123,8 +123,8 @@ def mode_shifts(results: Sequence[RunResult]) -> ShownTable:
 
 
 def run_statistics(results: Sequence[RunResult]) -> Table:
-    speed = ("Communication steps", "Steps a second", "Times real time")
-    headings = (*speed, "Threads", "Time in FMUs", "By component")
+    of_steps = ("Communication steps", "Steps a second", "Times real time")
+    headings = (*of_steps, "Threads", "Time in FMUs", "By component")
     table = make_table("Run", "Scenario", *headings)
     for r in results:
         s = r.statistics
