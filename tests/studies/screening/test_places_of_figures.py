@@ -66,6 +66,7 @@ def test_a_stretch_is_joined_by_the_modes_of_its_anchor_and_of_its_last_intact_i
     own = SimpleNamespace(
         _task=SimpleNamespace(anchor=items[0], items=items[1:]),
         _bench=SimpleNamespace(perturbed=3, reused=5),
+        _runs=None,
     )
     made = _Worker._record(own, results)
     assert (made.first, made.last, made.last_place) == ("anchor", "one", 1)
