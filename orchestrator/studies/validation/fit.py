@@ -161,7 +161,8 @@ def fit_parameters(
             break
     best = min(trials, key=lambda one: one.cost)
     numbers = _numbers(best, wanted, residuals)
-    if _rms(best.errors) > max(_REACHED, _LEAVES * _rms(before)):
+    finished = all(one.finished for one in trials)
+    if finished and _rms(best.errors) > max(_REACHED, _LEAVES * _rms(before)):
         numbers = [_left_at_start(one) for one in numbers]
     found = [*_switches(best, trials, starts, residuals), *numbers]
     return Fit(
@@ -170,7 +171,7 @@ def fit_parameters(
         error_before=_rms(before),
         error_after=_rms(best.errors),
         runs=residuals.runs,
-        finished=all(one.finished for one in trials),
+        finished=finished,
     )
 
 

@@ -99,6 +99,9 @@ def test_an_interrupted_fit_keeps_the_best_values_so_far(recording):
     (one,) = content["fit"]
     assert one["value"] != 60
     assert (one["low"], one["high"]) == (None, None)
+    assert (
+        one["why_not"] is None
+    )  # a fit that was not ended has not found that there is nothing better
     (check,) = content["fit_events"]
     assert check["rms_after_pu"] < check["rms_before_pu"]
 
