@@ -14,6 +14,13 @@ from fmus.grid.element_data import Line
 from fmus.grid.network import Network
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.draft import Draft
+from orchestrator.cases.events.zero_sequence_transformers import (
+    add_transformer,
+    has_delta_at_network,
+    unit_side,
+    usual_leg,
+    usual_transformer,
+)
 from orchestrator.cases.flow.balance import FlowLine
 from orchestrator.cases.flow.induction_impedances import negative_admittance
 from orchestrator.cases.flow.power_flow import PowerFlow
@@ -31,7 +38,6 @@ from orchestrator.cases.networks.sequence_data import (
     EARTHED,
     SequenceData,
     ZeroLine,
-    ZeroTransformer,
     windings_of,
 )
 from orchestrator.cases.networks.transformer_kinds import is_known_transformer
@@ -111,12 +117,16 @@ class SequenceAssembly:
         z, ratio = self._impedance(branch), branch.tap * _turn(-branch.shift)
         self._add_line(self.negative, branch, z, branch.B, closed, ratio)
         known = self.data.branches.get(line.name)
-        if known is not None and self._is_turned(line, known):
-            self.turned.append(line.name)
-        if known is None and self._is_transformer(line):
-            known = self._usual_transformer(line, z)
         if known is not None:
-            self._add_zero_transformer(branch, known)
+            self.read.add("transformers")
+            if has_delta_at_network(self.network, line, known):
+                self.turned.append(line.name)
+        elif self._is_transformer(line):
+            known, missing = usual_transformer(self.network, line, z, self.table)
+            if missing:
+                self._assume(missing, line.name)
+        if known is not None:
+            add_transformer(self.zero, branch, known)
             return
         zero = self._zero_line(branch, line)
         self._add_line(self.zero, branch, zero.z, zero.b, closed, 1.0)
@@ -181,61 +191,7 @@ class SequenceAssembly:
         of_file = self.data.transformers
         if is_known_transformer(line, of_file, self.table.groups) or of_file is not None:
             return is_known_transformer(line, of_file, self.table.groups)
-        return not line.B and self._unit_side(line) is not None
-
-    def _unit_side(self, line: Line) -> int | None:
-        """Return the end, 0 or 1, at which units stand and no other branch; None where there is none."""
-        units = {port.bus for port in self.network.ports}
-        for k, bus in enumerate((line.from_bus, line.to_bus)):
-            others = [x for x in self.network.lines if bus in (x.from_bus, x.to_bus)]
-            if bus in units and len(others) == 1:
-                return k
-        return None
-
-    def _is_turned(self, line: Line, known: ZeroTransformer) -> bool:
-        """Return whether a transformer at a unit has its delta at the network's side and is earthed at the unit's."""
-        side = self._unit_side(line)
-        if side is None or len(known.windings) != 2:
-            return False
-        return known.windings[side] == EARTHED and known.windings[1 - side] == DELTA
-
-    def _usual_transformer(self, line: Line, z: complex) -> ZeroTransformer:
-        """Return a transformer by its vector group in the case, or by the usual one."""
-        z *= self.table.transformer_x0 or usual.TRANSFORMER_X0
-        given = self.table.groups.get(line.name)
-        if given is not None:
-            return ZeroTransformer(windings_of(given), z)
-        side = self._unit_side(line)
-        if side is None:
-            if self.table.transformers is None:
-                self._assume("transformers", line.name)
-            return ZeroTransformer(
-                windings_of(self.table.transformers or usual.NETWORK_TRANSFORMER), z
-            )
-        if self.table.step_up is None:
-            self._assume("step_up", line.name)
-        windings = windings_of(self.table.step_up or usual.STEP_UP)
-        return ZeroTransformer(windings if side == 1 else windings[::-1], z)
-
-    def _add_zero_transformer(self, branch: FlowLine, known: ZeroTransformer) -> None:
-        if branch.name in self.data.branches:
-            self.read.add("transformers")
-        one, other, square = branch.from_bus, branch.to_bus, branch.tap**2
-        if len(known.windings) == 1:  # a leg to the star point of three windings
-            z = known.z + 3 * known.earthing[0] / square
-            if known.windings[0] == EARTHED:
-                self.zero.add_series(one, other, z, branch.tap)
-            elif known.windings[0] == DELTA:
-                self.zero.add_to_earth(other, 1 / z)
-            return
-        first, second = (w == EARTHED for w in known.windings[:2])
-        z_first, z_second = 3 * known.earthing[0] / square, 3 * known.earthing[1]
-        if first and second:
-            self.zero.add_series(one, other, z_first + known.z + z_second, branch.tap)
-        elif first and known.windings[1] == DELTA:
-            self.zero.add_to_earth(one, 1 / (z_first + known.z) / square)
-        elif second and known.windings[0] == DELTA:
-            self.zero.add_to_earth(other, 1 / (known.z + z_second))
+        return not line.B and unit_side(self.network, line) is not None
 
     def _add_leg(self, branch: FlowLine) -> None:
         """Add a leg of a transformer with three windings that is an element of its own."""
@@ -247,16 +203,15 @@ class SequenceAssembly:
         bus, star = branch.from_bus.removeprefix("bus_"), owner.removeprefix("transformer_")
         known = self.data.branches.get(f"line_{bus}_{star}")
         if known is None and leg.isdigit():
-            given = self.table.groups.get(owner)
-            if given is None:
-                self._assume("groups", owner)
-            windings = windings_of(given or usual.THREE_WINDINGS)
-            own = windings[int(leg) - 1 : int(leg)] or (DELTA,)
-            known = ZeroTransformer(own, z * (self.table.transformer_x0 or usual.TRANSFORMER_X0))
+            known, missing = usual_leg(owner, int(leg), z, self.table)
+            if missing:
+                self._assume(missing, owner)
         if known is None:  # the part of a leg that carries its ratio
             self.zero.add_series(branch.from_bus, branch.to_bus, z, branch.tap)
             return
-        self._add_zero_transformer(branch, known)
+        if branch.name in self.data.branches:
+            self.read.add("transformers")
+        add_transformer(self.zero, branch, known)
 
     def _couple(self) -> None:
         """Add the mutual impedances between lines that are whole."""
