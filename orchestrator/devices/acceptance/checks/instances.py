@@ -1,4 +1,4 @@
-"""Checks that instances of one FMU leave each other alone, and begin anew as new ones do."""
+"""Checks that instances of one FMU leave each other alone, and give the same answer twice."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -8,7 +8,6 @@ import numpy as np
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import ComponentError, EndedError
 from orchestrator.devices.acceptance.checks.base import (
-    SAME,
     CheckResult,
     check,
     failed,
@@ -24,17 +23,19 @@ from orchestrator.devices.acceptance.checks.settings import (
     tune,
     with_each_setting,
 )
-from orchestrator.devices.acceptance.checks.subject import OperatingAt, Running, Stimulus, Subject
+from orchestrator.devices.acceptance.checks.subject import OperatingAt, Stimulus, Subject
 from orchestrator.devices.fmi.port import BoundDescription
 
-_OTHER = OperatingAt(v=1.03, theta=0.4, P=0.7, Q=-0.1)
+OTHER_POINT = OperatingAt(v=1.03, theta=0.4, P=0.7, Q=-0.1)
+"""Where the other instance lives: off the usual operating point, so that what it leaves behind shows."""
+
 _IN_ORDER = 50  # steps of a run that is set in reversed order: start values and inputs tell at once
 _CHUNK = 50  # steps that one instance does before the other one's turn comes
 IN_EVENTS = ", in dips and jumps as well"
 NOT_IN_EVENTS = "; not judged in dips and jumps, which it refuses"
 
 
-def _in_events(
+def apart_in_events(
     subject: Subject, runs: Callable[[], tuple[Numbers, Numbers]], usual: float
 ) -> tuple[float, str]:
     """How far two runs with dips and jumps are apart, and the output that shows it.
@@ -56,10 +57,10 @@ def independence(subject: Subject) -> CheckResult:
         return not_applicable(
             "independence", "because the FMU declares canBeInstantiatedOnlyOncePerProcess"
         )
-    return _first_fault(subject, _independent)
+    return first_fault(subject, _independent)
 
 
-def _first_fault(subject: Subject, look: Callable[[Subject, Setting], CheckResult]) -> CheckResult:
+def first_fault(subject: Subject, look: Callable[[Subject, Setting], CheckResult]) -> CheckResult:
     """The first fault that is found with some parameters set, or else the result with the parameters as they are.
 
     Raises a `ComponentError` with the parameters as they are; a setting with which the FMU does not work is passed
@@ -92,7 +93,7 @@ def _independent(subject: Subject, setting: Setting) -> CheckResult:
     if not subject.port:
         return passed("independence", says, difference=apart)
     rows = episode(subject, "independence")
-    large, output = _in_events(subject, lambda: _among_others(subject, rows, setting), apart)
+    large, output = apart_in_events(subject, lambda: _among_others(subject, rows, setting), apart)
     if large:
         says = f"{output} differs by {large:.3g} of its range in dips and jumps as soon as a second one has some too"
         return failed("independence", "shared between instances", says, difference=large)
@@ -105,10 +106,10 @@ def _among_others(subject: Subject, rows: Numbers, setting: Setting) -> tuple[Nu
     alone, again = (subject.through(rows, parameters=setting) for _ in range(2))
     if difference(alone, again)[0] > 0:
         return alone, alone
-    h, others, parts = subject.step_size, episode(subject, "independence, other", _OTHER), []
+    h, others, parts = subject.step_size, episode(subject, "independence, other", OTHER_POINT), []
     with (
         subject.running("first", parameters=setting) as first,
-        subject.running("second", point=_OTHER, parameters=setting) as second,
+        subject.running("second", point=OTHER_POINT, parameters=setting) as second,
     ):
         for begin in range(0, len(rows), _CHUNK):
             for running, some in ((second, others), (first, rows)):
@@ -125,7 +126,7 @@ def _idle(subject: Subject, setting: Setting) -> str | None:
     with subject.running("idle", parameters=setting) as idle:
         idle.record(3, h, stimulus)
         before = idle.read()
-        with subject.running("busy", point=_OTHER, parameters=setting) as busy:
+        with subject.running("busy", point=OTHER_POINT, parameters=setting) as busy:
             busy.record(20, h, lambda t: 3 * stimulus(t))
         after = idle.read()
     apart, place = difference(before[None], after[None])
@@ -137,7 +138,7 @@ def _beside(subject: Subject, steps: int, stimulus: Stimulus, setting: Setting) 
     h, other = subject.step_size, subject.steps(hold=7 * subject.step_size, seed=2)
     with subject.running("first", parameters=setting) as first:
         rows = [first.read()]
-        with subject.running("second", point=_OTHER, parameters=setting) as second:
+        with subject.running("second", point=OTHER_POINT, parameters=setting) as second:
             tune(second, elsewhere(subject, switches=False))
             for k in range(steps):
                 first.time = k * h
@@ -173,7 +174,7 @@ def repeatability(subject: Subject) -> CheckResult:
     if not subject.port:
         return passed("repeatability", says, difference=apart)
     rows = episode(subject, "repeatability")
-    large, output = _in_events(
+    large, output = apart_in_events(
         subject, lambda: (subject.through(rows), subject.through(rows)), apart
     )
     if not large:
@@ -181,7 +182,7 @@ def repeatability(subject: Subject) -> CheckResult:
     says = (
         f"{output} differs by {large:.3g} of its range between two equal runs with dips and jumps"
     )
-    if _in_events(subject, lambda: (_first(subject, rows), _first(subject, rows)), apart)[0]:
+    if apart_in_events(subject, lambda: (_first(subject, rows), _first(subject, rows)), apart)[0]:
         return failed("repeatability", "not repeatable", says, difference=large)
     says += (
         ", and not between the first runs of two processes: the first one leaves something behind"
@@ -192,106 +193,3 @@ def repeatability(subject: Subject) -> CheckResult:
 def _first(subject: Subject, rows: Numbers) -> Numbers:
     subject.process().close()  # the next instance is the first of another process
     return subject.through(rows)
-
-
-@check("reset", "Is it like new after fmi2Reset?", needs=SAME)
-def reset(subject: Subject) -> CheckResult:
-    """Also with its tunable Booleans the other way: in the life before, and in the one after."""
-    try:
-        return _first_fault(subject, _like_new)
-    except ComponentError as error:
-        return failed("reset", "reset fails", str(error))
-
-
-def _like_new(subject: Subject, setting: Setting) -> CheckResult:
-    """Compare a run after fmi2Reset with one of a new instance, with some parameters set."""
-    steps, h = affordable(subject, 300), subject.step_size
-    stimulus, moved = subject.steps(hold=10 * h), elsewhere(subject)
-    with subject.running(parameters=setting) as new:
-        begun = new.component.values(moved)
-        fresh = new.record(steps, h, stimulus)
-    with subject.running(point=_OTHER, parameters=setting) as running:
-        _live(running, steps)
-        tune(running, moved)
-        running.point = None
-        running.reset()
-        after = running.component.values(moved)
-        again = running.record(steps, h, stimulus)
-    left = [n for n in moved if after[n] != begun[n]]
-    if left:
-        says = f"{left[0]} is {after[left[0]]:g} after fmi2Reset, and {begun[left[0]]:g} in a new instance"
-        return failed("reset", "reset leaves something", says)
-    apart, place = difference(fresh, again)
-    if apart > EQUAL:
-        says = (
-            f"{subject.watched[place]} differs by {apart:.3g} of its range in a run after fmi2Reset"
-        )
-        return failed("reset", "reset leaves something", says, difference=apart)
-    says = f"a run after fmi2Reset differs by {apart:.1g} from one of a new instance"
-    if not subject.port:
-        return passed("reset", says, difference=apart)
-    large, output = _in_events(subject, lambda: _after_reset(subject, setting), apart)
-    if large:
-        says = f"{output} differs by {large:.3g} of its range in dips and jumps after others and fmi2Reset"
-        return failed("reset", "reset leaves something", says, difference=large)
-    return passed("reset", f"{says}{output}", difference=apart)
-
-
-def _after_reset(subject: Subject, setting: Setting) -> tuple[Numbers, Numbers]:
-    """A run of a new instance, and one after a life with dips and jumps and fmi2Reset."""
-    rows, life = episode(subject, "reset"), episode(subject, "reset, life", _OTHER)
-    fresh = subject.through(rows, parameters=setting)
-    with subject.running(point=_OTHER, parameters=setting) as running:
-        running.hold(life, len(life), subject.step_size)
-        running.point = None
-        running.reset()
-        return fresh, running.hold(rows, len(rows), subject.step_size)
-
-
-@check("reinstantiation", "Is a later instance like the first?", needs=SAME)
-def reinstantiation(subject: Subject) -> CheckResult:
-    """Compare a first instance with later ones: after another's life while the library stays loaded, and alone."""
-    steps, h = affordable(subject, 300), subject.step_size
-    stimulus, later = subject.steps(hold=10 * h), []
-    try:
-        with subject.running("first") as first:
-            fresh = first.record(steps, h, stimulus)
-            if not subject.description.one_instance:
-                with subject.running("second", point=_OTHER) as second:
-                    _live(second, steps)
-                later.append(subject.trajectory(steps, h, stimulus))
-        later.append(subject.trajectory(steps, h, stimulus))
-    except ComponentError as error:
-        return failed("reinstantiation", "no second instance", str(error))
-    apart, place = max(difference(fresh, again) for again in later)
-    if apart > EQUAL:
-        says = f"{subject.watched[place]} differs by {apart:.3g} of its range in a later instance"
-        return failed("reinstantiation", "instances differ", says, difference=apart)
-    says = f"a run of a later instance differs by {apart:.1g}"
-    if not subject.port:
-        return passed("reinstantiation", says, difference=apart)
-    large, output = _in_events(subject, lambda: _after_a_life(subject), apart)
-    if large:
-        says = f"{output} differs by {large:.3g} of its range in dips and jumps, in an instance after one that had some"
-        return failed("reinstantiation", "instances differ", says, difference=large)
-    return passed("reinstantiation", f"{says}{output}", difference=apart)
-
-
-def _after_a_life(subject: Subject) -> tuple[Numbers, Numbers]:
-    """A run, and the same one after another instance's dips and jumps; that one still lives where there may be two."""
-    rows, life = (
-        episode(subject, "reinstantiation"),
-        episode(subject, "reinstantiation, life", _OTHER),
-    )
-    fresh = subject.through(rows)
-    with subject.running("second", point=_OTHER) as second:
-        second.hold(life, len(life), subject.step_size)
-        if not subject.description.one_instance:
-            return fresh, subject.through(rows)
-    return fresh, subject.through(rows)
-
-
-def _live(running: Running, steps: int) -> None:
-    """Give an instance a life elsewhere."""
-    elsewhere = running.subject.steps(hold=7 * running.subject.step_size, seed=3)
-    running.record(steps, running.subject.step_size, lambda t: 2 * elsewhere(t))

@@ -12,6 +12,7 @@ from orchestrator.devices.acceptance.checks import (
     loading,
     points,
     port,
+    reset,
     resources,
     ride_through,
     running,
@@ -25,7 +26,7 @@ from orchestrator.devices.acceptance.checks import (
 )
 
 MODULES = (
-    *(file, loading, running, instances, clock, state, sampling, timing, tuning),
+    *(file, loading, running, instances, reset, clock, state, sampling, timing, tuning),
     *(port, points, signs, evenness, damping, ride_through, windup, aftermath, unbalanced),
     *(extremes, resources),
 )
