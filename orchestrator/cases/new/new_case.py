@@ -11,7 +11,6 @@ from orchestrator.cases.flow.beside_file import BesideFile
 from orchestrator.cases.form.csv_rows import number, rows_of
 from orchestrator.cases.networks.data import bus_name, network_data
 from orchestrator.cases.networks.record_use import RecordUse
-from orchestrator.cases.new.case_questions import LINE_OF_TEXT, with_questions
 from orchestrator.cases.new.case_text import CaseText, bus_of_largest_load
 from orchestrator.cases.new.converter_places import (
     ConverterPlace,
@@ -20,6 +19,7 @@ from orchestrator.cases.new.converter_places import (
     with_names,
 )
 from orchestrator.cases.new.network_files import sources_of
+from orchestrator.cases.new.question_comments import LINE_OF_TEXT, with_questions
 from orchestrator.cases.new.refusal import of_what_was_given
 from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.cases.scenario.prepare import PreparedScenario

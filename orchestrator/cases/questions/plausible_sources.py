@@ -1,11 +1,12 @@
 """Values of a network's source that are most unusual beside its own other data."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 from fmus.grid.network import Line
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.form.unusual_value import UnusualValue
+from orchestrator.cases.questions.plausible_loads import load_doubts
 from orchestrator.cases.questions.plausible_values import (
     place_of,
     place_of_source,
@@ -32,13 +33,11 @@ _ROUNDING = 1e-3  # part of the converters' power by which six digits of P_0 dif
 _COMPARED = 8  # converters from which on chance would make some of them fit
 _ALIKE = 2.0  # factor within which machines are alike
 _UNLIKE = 5.0  # factor from which a machine is unlike the others
-_FAR = 20.0
-"""A capacitor or a load that is smaller than the next one by this factor is questioned where 100 times as much is
-usual; a step-up transformer from this factor of the least usual on."""
+_FAR = 20.0  # times the least usual reactance from which on a step-up transformer is questioned
 
 
 def source_doubts(draft: Draft) -> Iterator[UnusualValue]:
-    """Ask about loads below zero, capacitors, step-up transformers, saturation and a flat start."""
+    """Ask about a flat start, loads, step-up transformers, saturation, and units unlike the others."""
     grid = draft.system.components.get(draft.grid or "")
     if (
         grid is None
@@ -51,52 +50,11 @@ def source_doubts(draft: Draft) -> Iterator[UnusualValue]:
     where = place_of_source(draft)
     if draft.data.misfit:
         yield UnusualValue(f"{draft.grid}.{SOLVED}", where, draft.data.misfit, "a flat start")
-    yield from _negative_loads(draft, draft.grid, where)
-    yield from _hundredths(draft.grid, "shunt", "Mvar", draft.data.capacitors, where)
-    loads = {
-        x.name[5:]: value_of(grid, f"{x.name}.P")
-        for x in draft.network.loads
-        if x.name.startswith("load_")
-    }
-    yield from _hundredths(
-        draft.grid, "load", "MW", {name: p for name, p in loads.items() if p and p > 0}, where
-    )
+    yield from load_doubts(draft, draft.grid, where)
     yield from _step_up(draft, draft.grid, grid, where)
     yield from _saturation(draft)
     yield from _own_converters(draft)
     yield from _unlike_others(draft)
-
-
-def _negative_loads(draft: Draft, grid: str, where: str) -> Iterator[UnusualValue]:
-    table, found = draft.given.case.network, draft.data
-    if table is None or found is None or table.generation_model.active is not None:
-        return
-    names = {load.name for load in found.loads}
-    for bus, p_mw in found.feeding.items():
-        number = bus.removeprefix("bus_")
-        apart = f"static_{number}" in names
-        beside = " beside what loads draw there" if apart else ""
-        text = f"the load at {bus} is {p_mw:g} MW, below zero{beside}: it feeds in, as static generation; is its "
-        name = f"{grid}.{'static' if apart else 'load'}_{number}.P"
-        yield UnusualValue(name, where, f"{text}sign right?", "a load below zero")
-
-
-def _hundredths(
-    grid: str, what: str, unit: str, found: Mapping[str, float], where: str
-) -> Iterator[UnusualValue]:
-    """Ask about one that is much smaller than all others, of which only the smallest can be one."""
-    if len(found) < 2:
-        return
-    bus = min(found, key=lambda name: found[name])
-    b, others = found[bus], [other for name, other in found.items() if name != bus]
-    if b < min(others) / _FAR and 0.2 * min(others) < 100 * b < 5 * max(others):
-        number = bus.removeprefix("bus_")
-        text = (
-            f"the {what} at bus_{number} has {b:g} {unit}, where the others have {min(others):g} to "
-            f"{max(others):g} {unit}: is {100 * b:g} {unit} meant?"
-        )
-        name = f"{grid}.{what}_{number}.{'B' if what == 'shunt' else 'P'}"
-        yield UnusualValue(name, where, text, f"a {what} much smaller than the others")
 
 
 def _step_up(draft: Draft, name: str, grid: ComponentPlan, where: str) -> Iterator[UnusualValue]:

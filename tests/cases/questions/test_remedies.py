@@ -439,6 +439,7 @@ _READERS = (
     *(_CASES / "networks").rglob("*.py"),
     *(_CASES / "new").glob("*.py"),
     _CASES / "questions" / "plausibility.py",
+    _CASES / "questions" / "plausible_loads.py",
     _CASES / "questions" / "plausible_sources.py",
     _CASES / "flow" / "limits.py",
     _CASES / "scenario" / "operating_point.py",

@@ -10,7 +10,6 @@ from orchestrator.cases.networks.psse.device_records import (
     read_devices,
     series_impedances,
 )
-from orchestrator.cases.networks.psse.raw_accounts import record_uses
 from orchestrator.cases.networks.psse.raw_branches import read_lines, read_transformers
 from orchestrator.cases.networks.psse.raw_buses import leave_out_bare_buses, merge_buses, read_buses
 from orchestrator.cases.networks.psse.raw_file import read_file
@@ -24,6 +23,7 @@ from orchestrator.cases.networks.psse.raw_tables import (
     GENERATOR_COLUMNS,
     RawTables,
 )
+from orchestrator.cases.networks.psse.raw_uses import record_uses
 from orchestrator.cases.networks.psse.records import leave_out
 from orchestrator.cases.networks.psse.static_vars import Modelled, units_of_devices, units_of_shunts
 from orchestrator.cases.networks.source_changes import Changes

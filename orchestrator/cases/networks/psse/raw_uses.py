@@ -1,4 +1,4 @@
-"""Uses of the records of a RAW file: used, held at its value, or not used."""
+"""Uses of the records of a RAW file, area interchange among them: used, held at its value, or not used."""
 
 from collections.abc import Collection, Mapping, Sequence
 
