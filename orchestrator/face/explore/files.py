@@ -9,7 +9,7 @@ from orchestrator.output.report.html.elements import held_data
 PAGE = "page.html"
 SCRIPTS = (
     "base.js",
-    "map.js",
+    "mode_map.js",
     "table.js",
     "values.js",
     "network.js",
