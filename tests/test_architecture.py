@@ -555,7 +555,7 @@ def test_the_page_knows_every_room_and_where_each_question_is_answered():
     for question, file, names in rows:
         text = (ROOT / file.strip(" `")).read_text(encoding="utf-8")
         for name in re.findall(r"`(\w+)`", names):
-            found = re.search(rf"^(def |class )?{name}\b", text, re.MULTILINE)
+            found = re.search(rf"^(def |class |function )?{name}\b", text, re.MULTILINE)
             assert found, f"{question.strip()} {file.strip()} has no {name}"
 
 
