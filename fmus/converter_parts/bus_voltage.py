@@ -9,7 +9,7 @@ from fmus.toolchain.blocks import low_pass
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import MasterStep
-from fmus.toolchain.port import DevicePort
+from fmus.toolchain.port import OperatingPoint
 from fmus.toolchain.symbols import Expr, exp, fmax
 
 # communication step in parts of the lags below which their delays are those of none: 2e-7 from τ
@@ -51,7 +51,7 @@ class ExtrapolatedVoltage:
 
 
 def extrapolated_voltage(
-    m: ModelBuilder, port: DevicePort, master: MasterStep
+    m: ModelBuilder, port: OperatingPoint, master: MasterStep
 ) -> ExtrapolatedVoltage:
     """Declare both lags.
 

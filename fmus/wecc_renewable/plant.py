@@ -121,28 +121,56 @@ def plant_references(
         for name, base in (("Qref", "S_n"), ("Vref", "bus"), ("Pref", "S_n"))
     )
     regulated, regulated_0 = (
-        _regulated(p, flags["VCFlag"], *point)
+        regulated_voltage(p, flags["VCFlag"], *point)
         for point in ((t.v, t.P, t.Q), (Expr(t.v_0), t.P_0, t.Q_0))
     )
     v = t.filter(m, "V_filtered", regulated, p.Tfltr, initial=regulated_0)
     Q = t.filter(m, "Q_filtered", t.Q, p.Tfltr, initial=t.Q_0)
     error = if_else(flags["RefFlag"], regulated_0 + change_V - v, t.Q_0 + change_Q - Q)
-    limited = clamp(dead_band(error, p.dbd1, p.dbd2), p.emin, p.emax)
     least, most = _around(m, start.Q, (p.Qmin, p.Qmax), Expr(1.0))
-    how = Controller(p.Kp, p.Ki, least, most, 1.0, t.v < p.Vfrz)
-    of_voltage = controlled(m, "Q_control", limited, how, initial=start.Q)
-    reactive = lead_lag(m, "lead_lag", of_voltage, p.Tft, p.Tfv, start.Q)
+    reactive = reactive_control(m, p, error, Limits(least, most), t.v < p.Vfrz, initial=start.Q)
 
     measured = t.filter(m, "P_filtered", t.P, p.Tp, initial=t.P_0)
-    away = 1 - frequency_of(m, seen, omega_b, p.T_f)
-    beyond = dead_band(away, p.fdbd1, p.fdbd2)
-    droop = p.Dup * fmax(beyond, 0) + p.Ddn * fmin(beyond, 0)
-    power_error = clamp(t.P_0 + change_P - measured + droop, p.femin, p.femax)
+    power_error = t.P_0 + change_P - measured
+    power_error += droop(p, 1 - frequency_of(m, seen, omega_b, p.T_f))
     floor, ceiling = _around(m, start.P, (p.Pmin, p.Pmax), flags["Fflag"])
-    of_power = Controller(p.Kpg, p.Kig, floor, ceiling, flags["Fflag"], Expr(0.0))
-    wanted = controlled(m, "P_control", power_error, of_power, initial=start.P)
-    slow = low_pass_or_nothing(m, "P_reference", wanted, p.Tg, start.P)
+    slow = active_control(
+        m, p, power_error, Limits(floor, ceiling), flags["Fflag"], initial=start.P
+    )
     return References(if_else(flags["Fflag"], slow, start.P + change_P), reactive)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Least and most output of a control."""
+
+    low: Expr
+    high: Expr
+
+
+def reactive_control(
+    m: ModelBuilder, p: Given, error: Expr, limits: Limits, frozen: Expr, *, initial: Scalar
+) -> Expr:
+    """Declare what turns an error of reactive power or voltage into a reference; ``initial``: of its output."""
+    limited = clamp(dead_band(error, p.dbd1, p.dbd2), p.emin, p.emax)
+    how = Controller(p.Kp, p.Ki, limits.low, limits.high, 1.0, frozen)
+    of_voltage = controlled(m, "Q_control", limited, how, initial=initial)
+    return lead_lag(m, "lead_lag", of_voltage, p.Tft, p.Tfv, initial)
+
+
+def droop(p: Given, away: Expr) -> Expr:
+    """Active power [pu, S_n] by how far the frequency is below the rated one [pu]."""
+    beyond = dead_band(away, p.fdbd1, p.fdbd2)
+    return p.Dup * fmax(beyond, 0) + p.Ddn * fmin(beyond, 0)
+
+
+def active_control(
+    m: ModelBuilder, p: Given, error: Expr, limits: Limits, in_use: Expr, *, initial: Scalar
+) -> Expr:
+    """Declare what turns an error of active power into a reference; ``initial``: of its output."""
+    how = Controller(p.Kpg, p.Kig, limits.low, limits.high, in_use, Expr(0.0))
+    wanted = controlled(m, "P_control", clamp(error, p.femin, p.femax), how, initial=initial)
+    return low_pass_or_nothing(m, "P_reference", wanted, p.Tg, initial)
 
 
 def _around(
@@ -156,7 +184,7 @@ def _around(
     return fmin(low, start), fmax(high, start)
 
 
-def _regulated(p: Given, compensates: Expr, v: Expr, P: Scalar, Q: Scalar) -> Expr:
+def regulated_voltage(p: Given, compensates: Expr, v: Expr, P: Scalar, Q: Scalar) -> Expr:
     """Voltage that is controlled [pu]."""
     current = Phasor(P, -Q) / fmax(v, LEAST_VOLTAGE)  # in the frame of v
     inside = (Phasor(v, 0.0) - Phasor(p.Rc, p.Xc) * current).magnitude()
