@@ -51,7 +51,8 @@ class DyrRecord:
     ``kind``: key of the component's table: ``machine``, ``exciter``, ``governor``, ``stabilizer``, ``oel`` or ``uel``;
     ``compensator`` for what an exciter measures, which is no part of its own; ``converter`` for a record that is a
     whole component, to which ``electrical`` and ``plant`` may belong as its control and its plant's, ``shaft``,
-    ``aerodynamics``, ``pitch`` and ``torque`` as its wind turbine's; ``load`` for one that is a load's;
+    ``aerodynamics``, ``pitch`` and ``torque`` as its wind turbine's; ``plants`` for a controller of several units, a
+    component of its own; ``load`` for one that is a load's;
     ``part``: its value, the name of our part; for a whole component, its model;
     ``fields``: in the file's order; ``lacks``: parameters of our part that 0 leaves out, as the record has none;
     ``omissions``: what our part leaves out where a field, by its name, is not 0;
@@ -90,6 +91,7 @@ _SCOPES = {
     "load": "",
     "electrical": "electrical.",
     "plant": "plant.",
+    "plants": "",
     "shaft": "shaft.",
     "aerodynamics": "aerodynamics.",
     "pitch": "pitch.",

@@ -6,7 +6,7 @@ from dataclasses import replace
 from fmus.toolchain.model import Model
 from fmus.wecc_renewable.behind_impedance import REGCB1, REGCC1
 from fmus.wecc_renewable.converters import REGCA1, Kind
-from fmus.wecc_renewable.dyr_fields import ELSEWHERE
+from fmus.wecc_renewable.dyr_fields import AT_A_UNIT, ELSEWHERE
 from fmus.wecc_renewable.electrical import Reeca1
 from fmus.wecc_renewable.electrical_blocking import Reecd1
 from fmus.wecc_renewable.electrical_storage import Reecc1
@@ -32,7 +32,8 @@ def wecc_plant_phasor(records: str = "REGCC1 REECD1") -> Model:
     ----------
     records
         PSS/E's names of its records, in any order: one of `CONVERTERS` and one of `CONTROLS`; REPCA1, with the word
-        ``elsewhere`` if it measures at another point of the network; WTDTA1, and with it some of `ON_SHAFT`.
+        ``elsewhere`` if it measures at another point of the network, or one of `AT_A_UNIT`, if a component of
+        `plant_controller_phasor` sets the references of several units; WTDTA1, and with it some of `ON_SHAFT`.
 
     Raises
     ------
@@ -42,7 +43,7 @@ def wecc_plant_phasor(records: str = "REGCC1 REECD1") -> Model:
     given = records.split()
     converter = _one_of("converter", CONVERTERS, given)
     control = _one_of("control", CONTROLS, given)
-    known = {*CONVERTERS, *CONTROLS, PLANT, ELSEWHERE, SHAFT, *ON_SHAFT}
+    known = {*CONVERTERS, *CONTROLS, PLANT, ELSEWHERE, *AT_A_UNIT, SHAFT, *ON_SHAFT}
     for name in given:
         if name not in known or given.count(name) > 1:
             what = "stands twice" if name in known else f"is none of {', '.join(sorted(known))}"
@@ -51,15 +52,19 @@ def wecc_plant_phasor(records: str = "REGCC1 REECD1") -> Model:
     for name, other in needed.items():
         if name in given and other not in given:
             raise ValueError(f"records = {records!r}: {name!r} needs {other!r} beside it")
+    plants = [name for name in given if name in (PLANT, *AT_A_UNIT)]
+    if len(plants) > 1:
+        raise ValueError(f"records = {records!r}: {' and '.join(plants)}: a unit has one of them")
     turbine = TurbineParts(*(name in given for name in ON_SHAFT)) if SHAFT in given else None
     makeup = Makeup(
         CONVERTERS[converter],
         CONTROLS[control],
         has_plant=PLANT in given,
         measures_elsewhere=ELSEWHERE in given,
+        is_one_of_several=any(name in given for name in AT_A_UNIT),
         turbine=turbine,
     )
-    rest = [name for name in (PLANT, ELSEWHERE, SHAFT, *ON_SHAFT) if name in given]
+    rest = [name for name in (PLANT, ELSEWHERE, *AT_A_UNIT, SHAFT, *ON_SHAFT) if name in given]
     name = "_".join(["wecc_plant", *(n.lower() for n in (converter, control, *rest)), "phasor"])
     title = f"Plant of {', '.join(n for n in (converter, control, *rest) if n != ELSEWHERE)}"
     return replace(composed(name, f"{title} (phasor type)", makeup), of_parts=True)

@@ -2,7 +2,10 @@
 
 from fmus.synchronous_generator.dyr_fields import records_beside
 
-PLANT_RECORDS = records_beside(__file__)
+_RECORDS = records_beside(__file__)
+_OF_BUS = "plants"  # kind of a controller of several units, whose record is of a bus
+
+PLANT_RECORDS = {name: record for name, record in _RECORDS.items() if record.kind != _OF_BUS}
 """By PSS/E's name: the kind ``converter`` is the current source and its model, ``electrical`` says what it feeds,
 ``plant`` sets the references, and the others are of a wind turbine; ``part`` of the plant's controller is the model
 with it."""
@@ -12,3 +15,11 @@ PLANT_MODEL = "wecc_plant_phasor"
 
 ELSEWHERE = "elsewhere"
 """Word among its records that says that the plant's controller measures at another point of the network."""
+
+CONTROLLER = "PLNTBU1"
+"""PSS/E's name of the controller of several units, which is of a bus."""
+
+CONTROLLER_RECORD = _RECORDS[CONTROLLER]
+
+AT_A_UNIT = ("REAX3BU1", "REAX4BU1")
+"""Its parts at units, as records of these."""

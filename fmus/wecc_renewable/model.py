@@ -23,6 +23,7 @@ from fmus.wecc_renewable.electrical import (
     in_dip,
 )
 from fmus.wecc_renewable.plant import Measured, measured_elsewhere, plant_references
+from fmus.wecc_renewable.several_units import references_by_plant
 from fmus.wecc_renewable.signals import References, Terminal
 from fmus.wecc_renewable.turbine import Turbine, TurbineParts
 
@@ -33,12 +34,15 @@ USUAL = usual_beside(__file__)
 
 @dataclass(frozen=True)
 class Makeup:
-    """The parts of a plant: converter, control, the plant's controller and where it measures, and a turbine."""
+    """The parts of a plant: converter, control, the plant's controller and where it measures, and a turbine.
+
+    ``is_one_of_several``: whether a controller of several units, a component of its own, changes the references."""
 
     converter: Kind = REGCA1
     control: type[Reeca1] = Reeca1
     has_plant: bool = False
     measures_elsewhere: bool = False
+    is_one_of_several: bool = False
     turbine: TurbineParts | None = None
 
 
@@ -89,11 +93,7 @@ def composed(name: str, title: str, makeup: Makeup) -> Model:
     turbine, t = plant.turbine, plant.terminal
     own = plant.electrical.references
     start = own if turbine is None else References(turbine.reference_0(own.P, t), own.Q)
-    references = (
-        _references_of_plant(m, plant, start, measures_elsewhere=makeup.measures_elsewhere)
-        if makeup.has_plant
-        else _constant_references(m, start)
-    )
+    references = _references(m, plant, start, makeup)
     asked = references.P
     if turbine is not None:
         asked = turbine.reference(m, t, asked, own.P, in_dip(t, plant.electrical))
@@ -150,6 +150,15 @@ def _declared(
             None if turbine is None else turbine.speed_0,
         )
     return _Plant(port, seen, converter, terminal, turbine, electrical)
+
+
+def _references(m: ModelBuilder, plant: _Plant, start: References, makeup: Makeup) -> References:
+    if makeup.is_one_of_several:
+        with m.scope("plant"):
+            return references_by_plant(m, plant.port.current_scale, start)
+    if makeup.has_plant:
+        return _references_of_plant(m, plant, start, measures_elsewhere=makeup.measures_elsewhere)
+    return _constant_references(m, start)
 
 
 def _references_of_plant(

@@ -73,6 +73,7 @@ MODELS = {
             "REGCC1 REECC1 REPCA1",
             "REGCB1 REECD1 REPCA1 elsewhere",
             "REGCA1 REECA1 WTDTA1 WTARA1 WTPTA1 WTTQA1",
+            "REGCB1 REECC1 REAX4BU1",
         )
     },
     **{f"exciter {name}": partial(exciter, name) for name in EXCITERS},

@@ -312,7 +312,8 @@ def test_a_record_has_the_fields_of_the_program():
     first = {"REGCA1": 1 + 14, "REECA1": 6 + 45, "REECB1": 5 + 25, "REPCA1": 7 + 27}
     others = {"REECC1": 5 + 45, "REECD1": 83, "REGCB1": 9, "REGCC1": 15}
     turbine = {"WTDTA1": 5, "WTARA1": 2, "WTPTA1": 10, "WTTQA1": 1 + 15}
-    numbers = first | others | turbine
+    at_a_unit = {"REAX3BU1": 1 + 7, "REAX4BU1": 1 + 7}
+    numbers = first | others | turbine | at_a_unit
     assert {name: len(record.fields) for name, record in PLANT_RECORDS.items()} == numbers
     known = {v.name for v in regca1_repca1_phasor().parameters}
     elsewhere = {v.name for v in regca1_repca1_remote_phasor().parameters}

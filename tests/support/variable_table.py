@@ -42,6 +42,7 @@ LEAFLETS = {
     "regca1_phasor": ROOT / "fmus" / "wecc_renewable" / "README.md",
     "regca1_repca1_phasor": ROOT / "fmus" / "wecc_renewable" / "README.md",
     "regca1_repca1_remote_phasor": ROOT / "fmus" / "wecc_renewable" / "README.md",
+    "plant_controller_phasor": ROOT / "fmus" / "wecc_renewable" / "README.md",
     "infinite_bus": ROOT / "fmus" / "infinite_bus" / "README.md",
     "test_bench": ROOT / "fmus" / "test_bench" / "README.md",
     "probe_a": ROOT / "fmus" / "probe" / "README.md",

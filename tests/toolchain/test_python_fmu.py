@@ -100,6 +100,11 @@ ALL_PATHS_OPEN = {
     "wecc_plant_phasor": {"communication_step": 5e-3, "Re": 0.01},
     "regca1_repca1_phasor": _PLANT_OPEN,
     "regca1_repca1_remote_phasor": _PLANT_OPEN,
+    "plant_controller_phasor": {
+        **{"communication_step": 5e-3, "RefFlag": 2, "Fflag": True, "p_0": 0.5, "q_0": 0.1},
+        **{"emax": 9.0, "emin": -9.0, "dbd1": 0.0, "dbd2": 0.0, "Kp": 0.1, "Tft": 0.02},
+        **{"fdbd1": 0.0, "fdbd2": 0.0, "Ddn": 2.0, "Dup": 2.0, "Tg": 0.0, "Kpg": 0.1},
+    },
     "regfm_b1_phasor": {
         "communication_step": 5e-3,
         "Re": 0.01,
@@ -138,6 +143,7 @@ BEHIND_LEFT_OUT_BLOCKS = {"P_m", "B", "I_p_command", "I_q_command"}
 # States that act at a threshold alone, which small changes do not reach.
 BEHIND_THRESHOLDS = {name: {"pll.freezing.awake"} for name in ("gfl_l2ep", "gfl_l2ep_phasor")} | {
     "regfm_b1_phasor": {"delta_ITmax", "delta_ITmin", "Idf", "Qf"},  # at limits, and by VdrpFlag
+    "plant_controller_phasor": {"V_filtered", "P_reference"},  # by RefFlag; Tg = 0 leaves it out
     "csvgn1_phasor": {"first", "second"},  # T5 = 0 leaves out the lag between them and the outputs
     "csvgn3_phasor": {"first", "second"},
     "csvgn5_phasor": {"measured", "first", "second"},  # the same of Ts6
