@@ -12,6 +12,7 @@ from orchestrator.cases.form.parameter_files import ParameterFile
 from orchestrator.cases.form.schema import CaseTable, ComponentTable, EventTable, ScenarioTable
 from orchestrator.cases.networks.data import NetworkData
 from orchestrator.cases.networks.measured_point import MeasuredPoint
+from orchestrator.cases.networks.psse.plant_controllers import PlantController, UnitOfPlant
 from orchestrator.cases.networks.psse.relay_records import LoadRelay, UnitRelay
 from orchestrator.cases.networks.record_use import RecordUse
 from orchestrator.core.errors import (
@@ -113,6 +114,9 @@ class Draft:
     active_limits: dict[str, tuple[float, float]] = field(default_factory=dict)
     # where units measure that do not at their own terminal
     measured: dict[str, MeasuredPoint] = field(default_factory=dict)
+    # controllers of several units, and these units, by component
+    plant_controllers: Sequence[PlantController] = ()
+    units_of_plants: Mapping[str, UnitOfPlant] = field(default_factory=dict)
     # relays of the labels of units, and of loads, by the records of dynamics data
     unit_relays: Sequence[tuple[str, UnitRelay]] = ()
     load_relays: Sequence[LoadRelay] = ()

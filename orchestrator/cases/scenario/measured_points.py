@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 from orchestrator.cases.draft import Draft
-from orchestrator.cases.flow.balance import FlowLine
 from orchestrator.cases.flow.power_flow import PowerFlow
 from orchestrator.cases.form.remedies import without_models
 from orchestrator.cases.networks.data import bus_name
@@ -16,7 +15,7 @@ INPUTS = ("plant.v", "plant.p", "plant.q")
 
 
 @dataclass(frozen=True)
-class _Found:
+class FoundPoint:
     """A measured point in the network: a bus, and a line, None for the unit's own power; ``is_far``: the end of the
     line that is measured is the one that its power does not enter at."""
 
@@ -33,7 +32,7 @@ def measured_sources(draft: Draft, name: str, own_bus: str) -> list[tuple[str, s
     if point is None or draft.grid is None:
         return []
     try:
-        found = _find(draft, point, own_bus)
+        found = find_point(draft, point, own_bus, PLANT)
     except InputError as error:
         draft.note(point.place, f"{name}: {error}")
         draft.found.refused_inputs.update(f"{name}.{variable}" for variable in INPUTS)
@@ -53,16 +52,15 @@ def start_measured_points(draft: Draft, flow: PowerFlow) -> None:
     if draft.network is None:
         return
     buses = {port.name: port.bus for port in draft.network.ports}
-    lines = {line.name: line for line in flow.lines}
     for name, point in draft.measured.items():
         if name not in draft.system.components:
             continue
         plan = draft.system.components[name]
-        found = _find(draft, point, buses[name])
+        found = find_point(draft, point, buses[name], PLANT)
         if found.line is None:
             power = flow.powers[name] * plan.number("S_n") / plan.number("S_base")
         else:
-            power = _entering(lines[found.line], flow)
+            power = power_into(found.line, flow)
         plan.parameters |= {
             "plant.v_0": abs(flow.voltages[found.bus]),
             "plant.p_0": power.real,
@@ -70,23 +68,27 @@ def start_measured_points(draft: Draft, flow: PowerFlow) -> None:
         }
 
 
-def _entering(line: FlowLine, flow: PowerFlow) -> complex:
+def power_into(name: str, flow: PowerFlow) -> complex:
     """Power that enters a line without its charging [pu, 100 MVA], as the grid's models give it."""
+    (line,) = (line for line in flow.lines if line.name == name)
     v = flow.voltages[line.from_bus]
     into, _ = line.powers(v, flow.voltages[line.to_bus])
     return complex(into + 1j * line.charging[0] * abs(v) ** 2)
 
 
-def _find(draft: Draft, point: MeasuredPoint, own_bus: str) -> _Found:
+def find_point(draft: Draft, point: MeasuredPoint, own_bus: str, record: str) -> FoundPoint:
+    """Return the place of a measured point in the network; an `InputError` where it is not there.
+
+    ``own_bus``: of the controller; ``record``: its record's name."""
     assert draft.network is not None
     bus = bus_name(str(point.bus)) if point.bus else own_bus
-    remedy = f"correct it, or write {without_models([PLANT])}, and the references are constant"
+    remedy = f"correct it, or write {without_models([record])}, and the references are constant"
     if bus not in draft.network.buses:
         raise InputError(
-            f"{PLANT} measures at bus {point.bus}, which the network has not; {remedy}"
+            f"{record} measures at bus {point.bus}, which the network has not; {remedy}"
         )
     if not point.near:
-        return _Found(bus)
+        return FoundPoint(bus)
     ends = tuple(bus_name(str(number)) for number in (point.near, point.far))
     names = draft.data.branch_names if draft.data else {}
     between = [line for line in draft.network.lines if {line.from_bus, line.to_bus} == {*ends}]
@@ -96,7 +98,7 @@ def _find(draft: Draft, point: MeasuredPoint, own_bus: str) -> _Found:
     chosen = of_circuit or (between if len(between) == 1 else [])
     if not chosen:
         raise InputError(
-            f"{PLANT} measures the branch {point.near}-{point.far}, circuit {point.circuit!r}, which is no line or "
+            f"{record} measures the branch {point.near}-{point.far}, circuit {point.circuit!r}, which is no line or "
             f"transformer of two windings of the network; {remedy}"
         )
-    return _Found(bus, chosen[0].name, is_far=chosen[0].from_bus != ends[0])
+    return FoundPoint(bus, chosen[0].name, is_far=chosen[0].from_bus != ends[0])

@@ -15,6 +15,7 @@ from orchestrator.cases.questions.plausibility import question
 from orchestrator.cases.scenario.feeding_loads import feeding_loads
 from orchestrator.cases.scenario.flow_units import note_contradictions, undecided_units
 from orchestrator.cases.scenario.measured_points import start_measured_points
+from orchestrator.cases.scenario.plants_of_several import start_plants
 from orchestrator.cases.scenario.start_values import (
     FollowingLoad,
     is_connected,
@@ -89,6 +90,7 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
         draft.note(draft.given.place("power_flow"), text, kind)
         return None
     start_measured_points(draft, flow)
+    start_plants(draft, flow)
     question(draft, undecided)
     draft.found.questions += [*_limit_questions(draft, flow), *_voltage_questions(draft, flow)]
     # else what it fed before is shared

@@ -43,6 +43,7 @@ from orchestrator.cases.networks.source_ratings import with_needed_ratings
 from orchestrator.cases.networks.unit_row import UnitRow, checked
 from orchestrator.cases.questions.plausibility import question
 from orchestrator.cases.scenario.motor_components import motor_components, take_motors
+from orchestrator.cases.scenario.plants_of_several import plant_components, take_plants
 from orchestrator.cases.scenario.protection_relays import take_relays
 from orchestrator.cases.scenario.recorded_loads import take_frequency, take_laws
 from orchestrator.cases.scenario.removed_parts import without_removed_parts
@@ -118,7 +119,7 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
                 if row.measured is not None:
                     draft.measured[name] = row.measured
                 draft.active_limits[name] = share * row.p_min_mw, share * row.p_max_mw
-    return components | motor_components(draft, motors)
+    return components | motor_components(draft, motors) | plant_components(draft)
 
 
 def _rows(draft: Draft, table: UnitsTable) -> tuple[list[UnitRow], Sequence[MotorLoad]]:
@@ -392,7 +393,7 @@ def _account(
     left = {name.upper() for name in table.dyr_leave_out}
     wanted = [record for record in records if record.name not in left]
     taken = take_laws(draft, wanted) | take_frequency(draft, wanted)
-    taken |= motors.places
+    taken |= motors.places | take_plants(draft, table, wanted, ours)
     relays = take_relays(draft, wanted)
     taken |= relays.places
     uses = [

@@ -6,6 +6,7 @@ from difflib import get_close_matches
 from fmus.toolchain.catalogue import model_names
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.scenario.measured_points import measured_sources
+from orchestrator.cases.scenario.plants_of_several import plant_sources
 from orchestrator.core.errors import InputError, Problem, QuestionTopic, few
 from orchestrator.core.options import Option
 
@@ -39,6 +40,9 @@ def connect(draft: Draft) -> None:
     taken = _taken_by_port(draft)
     for name in at_buses:
         _connect_to_bus(draft, name, draft.tables[name].bus or "", taken.get(name, []))
+    if not draft.found.network_failed and draft.grid in draft.system.components:
+        for source, target, place in plant_sources(draft):
+            _try_connect(draft, source, target, place)
 
 
 def _taken_by_port(draft: Draft) -> dict[str, list[str]]:

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from fmus.grid_following.dyr_fields import FIELDS, MODEL, PLANT
+from fmus.grid_following.dyr_fields import FIELDS, MODEL
 from orchestrator.cases.networks.psse.dyr_mistakes import (
     LEAST_STRANGE,
     count_repeats,
@@ -20,6 +20,7 @@ from orchestrator.cases.networks.psse.machine_model import (
     BY_SPEED,
     CLASSICAL,
     KNOWN_RECORDS,
+    OF_PLANTS,
     SOURCE_IMPEDANCE,
     WITHOUT_INERTIA,
     MachineModel,
@@ -86,7 +87,8 @@ def machine_models(
             of[key].append(record)
         if key not in at or record.name in left or (approximate and record.name in FIELDS):
             continue
-        known = None if approximate and record.name == PLANT else KNOWN_RECORDS.get(record.name)
+        is_left = approximate and record.name in OF_PLANTS
+        known = None if is_left else KNOWN_RECORDS.get(record.name)
         if known is None:
             remedy = remedy_for(record.name, labels[key], approximate=approximate)
             if remedy:
@@ -190,10 +192,10 @@ def _left_out_of_plant(
 ) -> Iterator[tuple[int, str]]:
     """Yield the line and the consequence of a plant's controller that the case leaves out."""
     for record in records:
-        if record.name == PLANT and PLANT in left and "electrical" in parts:
+        if record.name in OF_PLANTS and record.name in left and "electrical" in parts:
             yield (
                 record.line,
-                f"{PLANT} left out, as dyr_leave_out says: the references are constant",
+                f"{record.name} left out, as dyr_leave_out says: the references are constant",
             )
 
 

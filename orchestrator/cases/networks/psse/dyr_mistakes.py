@@ -3,13 +3,14 @@
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-from fmus.grid_following.dyr_fields import FIELDS, MODEL, PLANT
+from fmus.grid_following.dyr_fields import FIELDS, MODEL
 from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
 from orchestrator.cases.form.remedies import APPROXIMATING, replacement_of, without_models
 from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
 from orchestrator.cases.networks.psse.machine_model import (
     KINDS_OF_CONVERTERS,
     KNOWN_RECORDS,
+    OF_PLANTS,
     ON_SHAFT,
 )
 from orchestrator.core.errors import few
@@ -127,11 +128,11 @@ def remedy_for(name: str, unit: str, *, approximate: bool) -> str:
     """Return what to do about a record that no part stands for; empty where it is of no grid-following converter.
 
     ``unit``: label of its machine's unit."""
-    if not name.startswith(_FAMILIES):
+    if not name.startswith(_FAMILIES) and name not in OF_PLANTS:
         return ""
-    if name == PLANT:
+    if name in OF_PLANTS:
         return (
-            f", the controller of a plant; write {without_models([PLANT])}, and the references of its "
+            f", the controller of a plant; write {without_models([name])}, and the references of its "
             "converter are constant"
         )
     if approximate or name not in FIELDS:

@@ -20,6 +20,8 @@ _OWN_MODELS = (
     "USRLOD",
 )  # a user's model of a machine or a load: its name is the first value
 
+_OF_PLANTS = ("PLNTBU1", "REAX3BU1", "REAX4BU1")  # models of PSS/E that files write as a user's
+
 _OF_BUS = "USRBUS"  # a user's model of a bus: its name stands where others have a machine
 
 NUMBERED = ("VTGTPAT", "VTGDCAT", "FRQTPAT", "FRQDCAT")
@@ -105,11 +107,14 @@ def _record(file: str, line: int, tokens: Sequence[str], names: int) -> DynamicR
         )
     name, machine, values = tokens[1].upper(), tokens[2].strip(), tuple(tokens[3:])
     if name == _OF_BUS:
-        return DynamicRecord(file, line, int(tokens[0]), machine.upper(), "", values)
+        name = machine.upper()
+        values = _behind_counts(values) if name in _OF_PLANTS else values
+        return DynamicRecord(file, line, int(tokens[0]), name, "", values)
     if name in _OWN_MODELS and values:
         name, values = values[0].upper(), values[1:]
         if f"{name}T" in NUMBERED:
             return DynamicRecord(file, line, 0, f"{name}T", "", _of_users_relay(values))
+        values = _behind_counts(values) if name in _OF_PLANTS else values
     if name in OF_SHUNTS:
         values = values if OF_SHUNTS[name] else (machine, *values)
         identifier = machine if OF_SHUNTS[name] else ONLY_SHUNT
@@ -126,6 +131,14 @@ def _of_users_relay(values: tuple[str, ...]) -> tuple[str, ...]:
         return values
     first = int(counts[_ICONS])
     return (*rest[:first][:_OF_NUMBERED], *rest[first : first + int(counts[_CONS])][:_LIMITS])
+
+
+def _behind_counts(values: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the values of a user's model without its codes and counts; all as they are where these are not there."""
+    counts, rest = values[:_BEFORE_ICONS], values[_BEFORE_ICONS:]
+    are_counts = len(counts) == _BEFORE_ICONS and all(text.isdigit() for text in counts)
+    is_whole = are_counts and int(counts[_ICONS]) + int(counts[_CONS]) == len(rest)
+    return rest if is_whole else values
 
 
 def given_values(

@@ -17,6 +17,9 @@ from orchestrator.cases.networks.psse.missing_models import (
 )
 from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
 
+_PLANTS = "plants"
+"""Kind of the models that set the references of several units."""
+
 _AT_EXCITERS = ("stabilizer", "compensator", LIMITER)
 """Kinds of models that act on a voltage regulator."""
 
@@ -71,7 +74,8 @@ def _use_of(
     """Return what became of a record, why, and whether it is of no machine."""
     key = record.bus, record.machine
     of_load = names_load(record.name)
-    if (of_load or record.name in NUMBERED) and record.name in left:
+    of_none = of_load or record.name in NUMBERED or kind_of(record.name) == _PLANTS
+    if of_none and record.name in left:
         return UseOfRecord.NOT_USED, "dyr_leave_out names it", False
     if key in machines and not of_load:
         if record.name in left:

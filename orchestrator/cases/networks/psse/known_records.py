@@ -12,7 +12,7 @@ from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
 from fmus.regfm_b1.dyr_fields import REGFM_B1_RECORDS
 from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS, DyrRecord
-from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
+from fmus.wecc_renewable.dyr_fields import CONTROLLER, CONTROLLER_RECORD, PLANT_RECORDS
 from orchestrator.cases.networks.psse.composite_loads import COMPOSITE_NAMES
 from orchestrator.cases.networks.psse.composite_loads import MODEL as MODEL_OF_MOTORS
 from orchestrator.cases.networks.psse.dyr_records import NUMBERED
@@ -28,6 +28,7 @@ _OF_LIMITERS = "IEC 61970-302, STEPSS' page of RAMSES' exciters, Dynawo, OpenIPS
 _REGFM = "WECC's specification of REGFM_A1"
 _REGFM_B1 = "WECC's specification of REGFM_B1, in PNNL's script for PSS/E"
 _LOADS = "GridPACK's reader and model"
+_OF_SEVERAL = "WECC's REPC_B as PowerWorld's help lists it; fields as InterPSS reads them"
 _DISTRIBUTED = {
     "DERA1": "WECC's specification of DER_A; fields as PowerSystems.jl lists PSS/E's",
     "PVD1": "WECC's PVD1 as PowerWorld's help and ANDES have it; fields as Argonne's DYN reads them",
@@ -107,6 +108,9 @@ def known_records() -> list[KnownRecord]:
         KnownRecord(name, _KINDS[record.kind], record.part, _GENERIC, "; ".join(_of_plant(name)))
         for name, record in PLANT_RECORDS.items()
     ]
+    found.append(
+        KnownRecord(CONTROLLER, "plants of several units", CONTROLLER_RECORD.part, _OF_SEVERAL)
+    )
     found += [
         KnownRecord(name, "converter", record.part, _DISTRIBUTED[name], "; ".join(_limits(record)))
         for name, record in DISTRIBUTED_RECORDS.items()

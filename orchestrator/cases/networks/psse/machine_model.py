@@ -10,7 +10,7 @@ from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
 from fmus.regfm_b1.dyr_fields import REGFM_B1_RECORDS
 from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
-from fmus.wecc_renewable.dyr_fields import ELSEWHERE, PLANT_MODEL, PLANT_RECORDS
+from fmus.wecc_renewable.dyr_fields import AT_A_UNIT, ELSEWHERE, PLANT_MODEL, PLANT_RECORDS
 from orchestrator.cases.networks.measured_point import MeasuredPoint
 from orchestrator.cases.networks.unit_row import DoubtOfRecord
 
@@ -27,6 +27,9 @@ ON_SHAFT = ("aerodynamics", "pitch", "torque")
 
 KINDS_OF_CONVERTERS = ("converter", "electrical", "plant", "shaft", *ON_SHAFT)
 """Kinds of records that a converter is made of."""
+
+OF_PLANTS = ("REPCA1", *AT_A_UNIT)
+"""Records of controllers of plants, which set the references of a unit."""
 
 SOURCE_IMPEDANCE = {
     "regfm_a1_phasor": ("RL", "XL"),
@@ -83,7 +86,8 @@ def plant_of(names: Mapping[str, str], *, elsewhere: bool) -> tuple[str, dict[st
     word = (ELSEWHERE,) if elsewhere else ()
     besides = tuple(kind for kind in names if kind not in ("converter", "electrical")) + word
     first = (names["converter"], names["electrical"])
-    if first in _FIRST and besides in PLANT_MODELS:
+    is_one_of_several = names.get("plant") in AT_A_UNIT
+    if first in _FIRST and besides in PLANT_MODELS and not is_one_of_several:
         return PLANT_MODELS[besides], {}
     order = [names[kind] for kind in KINDS_OF_CONVERTERS if kind in names]
     return PLANT_MODEL, {"records": " ".join([*order, *word])}

@@ -21,31 +21,34 @@ def measured_points(
     for key, record in ((key, r) for key, own in of.items() for r in own if r.name == PLANT):
         if "plant" in parts[key] and len(record.values) >= _PLACES:
             try:
-                point = _measured_point(record, key[0])
+                point = point_of_record(record, key[0])
             except InputError as error:
                 problems.append(str(error))
                 continue
-            found |= {key: point} if point is not None else {}
+            found |= {} if point.is_own else {key: point}
     return found
 
 
-def _measured_point(record: DynamicRecord, own_bus: int) -> MeasuredPoint | None:
-    """Return where a plant's controller measures; None at its own terminal."""
-    numbers = []
-    for name, text in zip(("BUSR", "BUS1", "BUS2"), record.values, strict=False):
-        if not re.fullmatch(r"\d{1,9}", text):
-            raise InputError.at(
-                record.place,
-                f"{record.name} has {name} = {text!r}; it must be the number of a bus, or 0",
-            )
-        numbers.append(int(text))
-    bus, near, far = numbers
+def number_of_bus(record: DynamicRecord, field: str, text: str) -> int:
+    """Return the number of a bus in a record, 0 where it names none; an `InputError` where it is no number."""
+    if not re.fullmatch(r"\d{1,9}", text):
+        raise InputError.at(
+            record.place,
+            f"{record.name} has {field} = {text!r}; it must be the number of a bus, or 0",
+        )
+    return int(text)
+
+
+def point_of_record(record: DynamicRecord, own_bus: int) -> MeasuredPoint:
+    """Return where a plant's controller measures, by the first values of its record."""
+    bus, near, far = (
+        number_of_bus(record, name, text)
+        for name, text in zip(("BUSR", "BUS1", "BUS2"), record.values, strict=False)
+    )
     if bool(near) != bool(far):
         raise InputError.at(
             record.place,
             f"{record.name} has BUS1 = {near} and BUS2 = {far}; give both ends of it, or 0 twice",
         )
-    found = MeasuredPoint(
-        0 if bus == own_bus else bus, near, far, record.values[3].strip(), record.place
-    )
-    return None if found.is_own else found
+    circuit = record.values[3].strip()
+    return MeasuredPoint(0 if bus == own_bus else bus, near, far, circuit, record.place)

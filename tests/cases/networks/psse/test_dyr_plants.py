@@ -238,23 +238,6 @@ def test_other_records_are_one_plant(records, prepared):
         assert (given["torque.P3"], given["shaft.Freq1"]) == (0.6, 1.6)
 
 
-OF_SEVERAL = (
-    "3 'USRBUS' 'PLNTBU1' 504 0 7 28 7 15\n  3 9 8 '1' 0 0 1\n"
-    "  .2 1.4 .6 .03 .2 .55 .02 .08 .04 .5 -.4 -.01 .015 .8 -.7 1.1 .45 .1 -.002 .003 .6 -.5 .9 -.8 .1 12 14 0 /\n",
-    "3 'USRMDL' '1' 'REAX4BU1' 107 0 1 7 2 4 3\n  .17 1.83 .94 .72 -.68 .81 -.63 /\n",
-)
-"""A controller of several units as a user's model of a bus, and the part of it at one unit; order: InterPSS' tests."""
-
-
-def test_a_controller_of_several_units_is_named_and_their_references_are_constant(prepared):
-    lines = (OF_REGCA1, line("REECA1", BATTERY), *OF_SEVERAL)
-    with pytest.raises(CaseError, match=r"(?s)REAX4BU1 +1 .* constant references .*\['REAX4BU1'\]"):
-        prepared(with_records(*lines), "")
-    ready = prepared(with_records(*lines), 'dyr_leave_out = ["REAX4BU1"]')
-    (asked,) = [q.text for q in ready.questions if "PLNTBU1" in q.text]
-    assert "the references of the units that it sets are constant" in asked
-
-
 OF_GRIDPACK = (
     "3 'WTARA1' '1 ' 1 0.007 /\n",
     "3 'WTPTA1' '1 ' 25 150 30 0 0 0.3 27 0 10 -10 /\n",
