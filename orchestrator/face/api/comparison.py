@@ -9,12 +9,12 @@ from orchestrator.cases.form.given import Time, moment
 from orchestrator.core.asked import Names, names
 from orchestrator.core.errors import InputError, few
 from orchestrator.core.threads import side_by_side
-from orchestrator.face.api.identification import Recorded, opened
+from orchestrator.face.api.given_recording import Recorded, open_given
 from orchestrator.output.results.manifest import ResultsWarning
 from orchestrator.output.results.recorded import in_memory
+from orchestrator.studies.signals.common_times import common_times
 from orchestrator.studies.signals.comparison import compare as compare_signal
 from orchestrator.studies.signals.comparison import most_different
-from orchestrator.studies.signals.measured import common_times
 from orchestrator.studies.signals.signal_modes import RunComparison, doubt_text
 
 RINGS_FROM = 2.0
@@ -52,7 +52,7 @@ def compare(
     >>> print(f"{difference['grid.v']:.3f} pu")
     0.096 pu
     """
-    (first, label_a), (second, label_b) = opened(a, "a"), opened(b, "b")
+    (first, label_a), (second, label_b) = open_given(a, "a"), open_given(b, "b")
     labels = (label_a, label_b) if label_a != label_b else (f"a ({label_a})", f"b ({label_b})")
     _warn_of_different_ends(first, second, labels)
     _warn_of_other_files(first, second, labels)

@@ -8,7 +8,7 @@ import xarray as xr
 from orchestrator.core.asked import Names, names, positive
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError
-from orchestrator.face.api.identification import opened
+from orchestrator.face.api.given_recording import open_given
 from orchestrator.face.api.results import Run
 from orchestrator.output.results.comtrade.writing import write_comtrade
 from orchestrator.studies.signals.comparison import recorded
@@ -56,7 +56,7 @@ def export_comtrade(
     >>> [file.name for file in gfor.export_comtrade(run, ["gfor.omega"], f"{folder.name}/dip.cfg")]
     ['dip.cfg', 'dip.dat']
     """
-    dataset, label = opened(run, "run")
+    dataset, label = open_given(run, "run")
     chosen = names(signals, "signals") or [str(name) for name in dataset.data_vars]
     curves = {expression: _curve(dataset, expression, label) for expression in chosen}
     if path is None:

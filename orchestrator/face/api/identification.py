@@ -1,27 +1,18 @@
-"""The modes in a recorded signal."""
+"""The modes in a recorded signal: of a free response, or of what noise shakes."""
 
-import re
-import warnings
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pandas as pd
-import xarray as xr
 
-from orchestrator.cases.form.given import Time, moment, part_of_record, users_level
+from orchestrator.cases.form.given import Time, moment, part_of_record
 from orchestrator.core.asked import names as names_given
 from orchestrator.core.asked import number_between, positive, text_or_none
 from orchestrator.core.errors import AnalysisError, InputError
-from orchestrator.core.units import to_unit
-from orchestrator.face.api.results import Run
+from orchestrator.face.api.given_recording import Recorded, open_given
 from orchestrator.linear.signals.ambient import ambient_modes
 from orchestrator.linear.signals.identification import sampling
 from orchestrator.linear.signals.mode_doubts import straight_line
-from orchestrator.output.results.recorded import warn_of_early_end
-from orchestrator.output.results.trajectory import open_trajectory
 from orchestrator.studies.oscillations.verdict import forced_frequencies
 from orchestrator.studies.signals.ambient import AmbientModes, AmbientWindow
 from orchestrator.studies.signals.angle_units import doubtful_angles
@@ -30,13 +21,8 @@ from orchestrator.studies.signals.comparison import (
     require_numbers,
     strongest_modes,
 )
-from orchestrator.studies.signals.signal_modes import RARE, SignalModes
+from orchestrator.studies.signals.signal_modes import SignalModes
 
-Recorded = Any
-"""`Run`, `xarray.Dataset`, `xarray.DataArray`, `pandas.DataFrame`, or a path; pandas is imported late."""
-
-_SHOWN = 60  # characters of a wrong argument that an error shows
-_IN_BRACKETS = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
 _ONE_SIGNAL = "give one signal, 'a.b' or the difference 'a.b - c.d' of two"
 
 
@@ -73,7 +59,7 @@ def identify(
     2.83 Hz
     """
     text_or_none(signal, "signal", _ONE_SIGNAL)
-    dataset, label = opened(run, "run")
+    dataset, label = open_given(run, "run")
     if signal is None:
         if len(dataset.data_vars) != 1:
             raise InputError(f"signal = None; {_ONE_SIGNAL}")
@@ -126,7 +112,7 @@ def ambient(
     rule = "a damping in percent from 0 to 100, such as 3.0"
     alarm = number_between(level, "%", "level", 0.0, 100.0, rule)
     highest_hz = positive(highest_hz, "highest_hz", "give a frequency above 0 in Hz, such as 2.5")
-    dataset, label = opened(run, "run")
+    dataset, label = open_given(run, "run")
     names = list(names_given(signals, "signals"))
     if not names:
         raise InputError(f"signals = {signals!r}; {_ONE_SIGNAL}, or several")
@@ -159,108 +145,3 @@ def ambient(
     if all(one.failure for one in found):
         raise AnalysisError(f"{label}: {found[0].failure}")
     return AmbientModes(label, names, found, alarm)
-
-
-def as_dataset(given: Any, otherwise: str) -> Any:
-    """A table or an array over the time [s] as a dataset; anything else as it is.
-
-    Raises an `InputError` where the index or the dimension is no time that ascends."""
-    if isinstance(given, pd.Series):
-        given = given.to_frame(str(given.name or otherwise))
-    if isinstance(given, pd.DataFrame):
-        frame = given.set_index("time") if "time" in given.columns else given
-        data = xr.Dataset(
-            {str(name): ("time", frame[name].to_numpy()) for name in frame},
-            {"time": _seconds(frame.index, otherwise)},
-        )
-    elif isinstance(given, xr.DataArray):
-        if given.dims != ("time",) or "time" not in given.coords:
-            raise InputError(
-                f"{otherwise} is an array over {', '.join(map(str, given.dims)) or 'nothing'}; its one dimension must "
-                "be 'time', with a coordinate in seconds"
-            )
-        data = given.to_dataset(name=str(given.name or otherwise))
-        data = data.assign_coords(time=_seconds(given["time"].to_index(), otherwise))
-    else:
-        return given
-    wrong = [name for name in data if data[name].dtype.kind not in "fiub"]
-    if wrong:
-        raise InputError(f"{otherwise}: column {wrong[0]!r} holds no numbers; leave it out")
-    return data
-
-
-def _seconds(index: Any, otherwise: str) -> Any:
-    """An index as times [s]: numbers, or dates from the first on."""
-    if isinstance(index, pd.DatetimeIndex):
-        index = index - index[0]
-    if isinstance(index, pd.TimedeltaIndex):
-        index = index.total_seconds()
-    rule = "give numbers in seconds, dates, or time differences that ascend"
-    if index.dtype.kind not in "fiu":
-        raise InputError(f"{otherwise}: its index is no time; {rule}")
-    if (
-        isinstance(index, pd.RangeIndex)
-        and index.name is None
-        and (index.start, index.step) == (0, 1)
-    ):
-        raise InputError(
-            f"{otherwise}: its index counts the rows, and is no time; give the times in seconds as index or as a "
-            "column 'time', such as frame.set_index(0.01 * frame.index)"
-        )
-    if not index.is_monotonic_increasing or not index.is_unique:
-        raise InputError(f"{otherwise}: the times of its index do not ascend; {rule}")
-    times = index.to_numpy(dtype=float)
-    name = "time" if index.name is None else str(index.name)
-    apart = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
-    if apart > RARE and not _IN_BRACKETS.search(name):
-        text = f"question: {otherwise}: its times are {apart:g} apart, perhaps in ms, and their name {name!r} says no "
-        text += f"unit; they are taken as seconds: name the index '{name} [s]' or '{name} [ms]'"
-        from orchestrator.face.api.scenario import UnusualDataWarning  # noqa: PLC0415 - imports the reading of cases
-
-        warnings.warn(text, UnusualDataWarning, stacklevel=users_level())
-    return times * _second(name, otherwise)
-
-
-def _second(name: str, otherwise: str) -> float:
-    """How many seconds the unit is that the name of an index has in brackets; 1 without one."""
-    unit = _IN_BRACKETS.search(name)
-    if unit is None:
-        return 1.0
-    try:
-        return to_unit(f"1 {unit[1]}", "s")
-    except ValueError as error:
-        raise InputError(
-            f"{otherwise}: its index is named {name!r}, and a time is in s, ms or us; name its unit so"
-        ) from error
-
-
-def _kind(given: Any) -> str:
-    """Return what was given, in few words."""
-    text = repr(given)
-    return text if len(text) <= _SHOWN and "\n" not in text else f"of type {type(given).__name__}"
-
-
-def opened(run: Recorded, otherwise: str) -> tuple[xr.Dataset, str]:
-    """A run's dataset and its name; ``otherwise`` names a dataset without a scenario's name.
-
-    Warns
-    -----
-    ResultsWarning
-        If the run ended before its stop time.
-    """
-    if isinstance(run, str | Path):
-        dataset, label = open_trajectory(Path(run)), str(run)
-    else:
-        dataset = run.dataset if isinstance(run, Run) else as_dataset(run, otherwise)
-        if not isinstance(dataset, xr.Dataset):
-            raise InputError(
-                f"{otherwise} is {_kind(run)}; give a run, its dataset, a DataFrame or DataArray over the time, the "
-                "folder of a scenario's results, or the file of a recording (COMTRADE, CSV, Excel)"
-            )
-        label = str(dataset.attrs.get("scenario", otherwise))
-    if not dataset.sizes.get("time"):
-        raise InputError(
-            f"{label}: nothing was recorded over the time; give a run that came beyond its start"
-        )
-    warn_of_early_end(dataset, label)
-    return dataset, label

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from orchestrator.cases.form.given import Time
 from orchestrator.core.errors import InputError
-from orchestrator.face.api.identification import opened
+from orchestrator.face.api.given_recording import open_given
 from orchestrator.face.api.results import Run
 from orchestrator.face.api.scenario import Scenario
 from orchestrator.studies.oscillations.reading import contest_cases, read_contest
@@ -50,7 +50,7 @@ def source(
     >>> print(f"{found.found.frequency:.1f} Hz, {found.evidence.kind}: {found.source}")
     0.8 Hz, forced: sg1
     """
-    dataset, label = opened(run, "run")
+    dataset, label = open_given(run, "run")
     if scenario is None:
         prepared = run.result.modes.prepared if isinstance(run, Run) else None
     elif isinstance(scenario, Scenario):

@@ -14,7 +14,7 @@ from orchestrator.core.errors import InputError
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.port import BoundDescription
-from orchestrator.face.api.identification import Recorded, opened
+from orchestrator.face.api.given_recording import Recorded, open_given
 from orchestrator.face.api.methods import in_turn
 from orchestrator.studies.black_box.port import start_of, values_for
 from orchestrator.studies.points.key import sha256_of
@@ -188,7 +188,7 @@ def _window(given: Any) -> tuple[float, float]:
 
 
 def _read_given(one: Any, number: int, start: Time | None, stop: Time | None) -> GivenRecording:
-    dataset, label = opened(one, f"recording {number}")
+    dataset, label = open_given(one, f"recording {number}")
     low = None if start is None else moment(start, "start")
     high = None if stop is None else moment(stop, "stop")
     dataset = dataset.sel(time=slice(low, high))

@@ -14,6 +14,7 @@ from orchestrator.linear.spectra.modes import OfEigenvalue
 
 TOLERANCE = 1e-6  # singular values below this fraction of the largest are taken for noise
 _MIN_SAMPLES = 20  # fewer hold no swing with its damping
+_LEAST_MULTIPLIER = 1e-6  # of a mode from sample to sample; a smaller one is gone within one sample
 _MAX_SAMPLES = 1200  # more are thinned out: the singular values of their Hankel matrix take seconds
 # rows of the triangle below this part of the tolerance change modes by its square, and most are
 _DROPPED = 1e-3
@@ -77,7 +78,7 @@ def identify_modes(
     found = [
         (complex(np.log(complex(mu)) / interval), abs(r))  # also of a real one below zero
         for mu, r in zip(multipliers, residues, strict=True)
-        if mu.imag >= 0 and abs(mu) > 1e-6
+        if mu.imag >= 0 and abs(mu) > _LEAST_MULTIPLIER
     ]
     modes = [
         IdentifiedMode(x, float(size / abs((weights * np.exp(x * lags)).sum())))
@@ -87,9 +88,10 @@ def identify_modes(
 
 
 def averaging(signal: NDArray[np.float64], thin: int) -> NDArray[np.float64]:
-    """Weights of the samples of which every so many averages are used: one where nothing is too fast for these.
+    """Return the weights with which samples are averaged before every ``thin``-th is used.
 
-    An average over equal times leaves the eigenvalues of a free response as they are."""
+    A signal in which nothing is too fast for the samples used needs no average: its one weight is 1. An average
+    over equal times leaves the eigenvalues of a free response as they are."""
     if thin <= 1 or len(signal) <= 4 * thin + 1:
         return np.ones(1)
     power = np.abs(np.fft.rfft((signal - signal.mean()) * np.hanning(len(signal)))) ** 2
@@ -129,6 +131,7 @@ class Sampling:
 
 
 def sampling(times: NDArray[np.float64], highest_hz: float = 10.0) -> Sampling:
+    """Return which samples of a record are used: ten for a period of ``highest_hz``, or fewer in a long record."""
     step = float(times[1] - times[0]) if len(times) > 1 else 0.0
     finest = 1 / (10 * highest_hz)
     thin = (
@@ -140,4 +143,5 @@ def sampling(times: NDArray[np.float64], highest_hz: float = 10.0) -> Sampling:
 
 
 def nearest(modes: list[IdentifiedMode], eigenvalue: complex) -> IdentifiedMode | None:
+    """Return the mode whose eigenvalue is nearest to another [rad/s]; None where there is no mode."""
     return min(modes, key=lambda m: abs(m.eigenvalue - eigenvalue), default=None)

@@ -15,19 +15,22 @@ if TYPE_CHECKING:
 _TURNS = {"rad": 2 * np.pi, "deg": 360.0}
 """A whole turn in each unit that an angle may be labelled with."""
 
-_OTHER = {"rad": "deg", "deg": "rad"}
+_OTHER = {"rad": "deg", "deg": "rad"}  # the unit that is meant where the stated one is wrong
 _WORDS = {"rad": "radians", "deg": "degrees"}
 _MARGIN = 1.01  # of a turn: what is rounded, or a little beyond it
 _NEAR = 0.05  # part of a turn by which a jump of a wrapped angle differs from it, with the motion of a sample
 _END = 0.1  # part of a turn from either end of its range at which an angle is wrapped
 _ALIKE = 0.9  # correlation from which on an angle moves as a frequency has it
-_FACTOR = 0.2  # part by which the ratio of the two motions may differ from 57.3
+_RATIO_MARGIN = 0.2
+"""Part by which the ratio of the motions by angle and by frequency may differ from 180/π = 57.3, which a wrong unit
+makes of it: far from 1, which the right unit gives."""
+
 _FEWEST = 20  # samples that tell a correlation
 _HERTZ = {"Hz": 1.0, "mHz": 1e-3}
 _SPEEDS = ("omega", "speed", "w")
 """Last parts of names of speeds in pu."""
 
-_NOMINAL = 55.0  # [Hz] between 50 and 60: either is within `_FACTOR` of it
+_NOMINAL = 55.0  # [Hz] between 50 and 60: either is within `_RATIO_MARGIN` of it
 
 
 def doubtful_angles(dataset: xr.Dataset, signal: str | None = None) -> list[str]:
@@ -66,7 +69,7 @@ def _contradiction(dataset: xr.Dataset, name: str, unit: str) -> str:
         whole = np.unwrap(seen, period=turn)
         ratio = _ratio(times, whole / _TURNS[unit], hertz[known])
         expected = _TURNS[unit] / turn
-        if ratio is not None and abs(ratio * expected - 1) < _FACTOR:
+        if ratio is not None and abs(ratio * expected - 1) < _RATIO_MARGIN:
             amount = "57.3 times as far as" if expected < 1 else "a 57.3rd of what"
             return f"moves {amount} {other} says"
     return ""

@@ -25,7 +25,8 @@ from orchestrator.linear.signals.mode_doubts import (
     worth_showing,
 )
 from orchestrator.output.results.signals import signal
-from orchestrator.studies.signals.measured import common_times, is_measured, measured_modes
+from orchestrator.studies.signals.common_times import common_times
+from orchestrator.studies.signals.measured import is_measured, measured_modes
 
 if TYPE_CHECKING:
     import xarray as xr

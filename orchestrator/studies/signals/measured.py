@@ -1,4 +1,4 @@
-"""Measured recordings, made ready for the identification of modes, and the times at which two can be compared."""
+"""Modes in measured recordings: gaps, uneven samples and waveforms are refused, and the noise is estimated."""
 
 from __future__ import annotations
 
@@ -15,79 +15,17 @@ from orchestrator.linear.signals.identification import (
     sampling,
 )
 from orchestrator.output.results.readers import LINE_FREQUENCY
+from orchestrator.studies.signals.common_times import median_interval
 
 if TYPE_CHECKING:
     import xarray as xr
-from dataclasses import dataclass
-
-from orchestrator.core.arrays import Vector
-from orchestrator.core.errors import InputError
-
-# times that differ by less than this part of the shorter interval are one time, rounded in two ways
-_NOISE = 1e-6
-
-
-@dataclass(frozen=True)
-class CommonTimes:
-    """Times of the run with the longer interval, within the time that both runs have."""
-
-    times: Numbers  # shape (n,) [s]
-    remark: str  # sentence on runs with different intervals; empty where both have the same times
-    _rows: tuple[Vector | None, Vector | None]
-    _recorded: tuple[Numbers, Numbers]
-
-    def values(self, run: int, signal: Numbers) -> Numbers:
-        rows = self._rows[run]
-        found = (
-            signal[rows] if rows is not None else np.interp(self.times, self._recorded[run], signal)
-        )
-        return np.asarray(found, dtype=float)
-
-
-def common_times(a: Numbers, b: Numbers, labels: tuple[str, str]) -> CommonTimes:
-    """Times at which two runs are compared: those of the run with the longer interval.
-
-    The other run's values are those that it recorded at these times. Where it lacks one of these times, its values are
-    interpolated: between two times of the shorter interval, and never between two of the longer one."""
-    both = (np.asarray(a, dtype=float), np.asarray(b, dtype=float))
-    noise = _NOISE * min(map(_interval, both))
-    begin, end = max(t[0] for t in both) - noise, min(t[-1] for t in both) + noise
-    inside = [np.flatnonzero((t >= begin) & (t <= end)) for t in both]
-    coarse = 0 if len(inside[0]) <= len(inside[1]) else 1
-    fine = 1 - coarse
-    times = both[coarse][inside[coarse]]
-    if len(times) < 2:
-        raise InputError(
-            f"{labels[0]} and {labels[1]} have no time in common; nothing can be compared"
-        )
-    at = np.searchsorted(both[fine], times - noise)
-    met = bool(np.all(np.abs(both[fine][np.minimum(at, len(both[fine]) - 1)] - times) <= noise))
-    rows: list[Vector | None] = [inside[coarse], at if met else None]
-    order = (rows[0], rows[1]) if coarse == 0 else (rows[1], rows[0])
-    same = met and len(inside[0]) == len(inside[1])
-    remark = "" if same else _remark(both, coarse, len(times), labels, met=met)
-    return CommonTimes(times, remark, order, both)
-
-
-def _remark(
-    both: tuple[Numbers, Numbers], coarse: int, count: int, labels: tuple[str, str], *, met: bool
-) -> str:
-    intervals = [f"{_interval(times):.6g} s" for times in both]
-    head = f"{labels[0]} is recorded every {intervals[0]}, {labels[1]} every {intervals[1]}"
-    if met:
-        return f"{head}: they are compared at the {count} times that both have."
-    return (
-        f"{head}, and they do not have all times in common: they are compared at the {count} times of "
-        f"{labels[coarse]}, between the records of {labels[1 - coarse]} where it has none. A fast motion "
-        "differs a little by that alone."
-    )
 
 
 _UNEVEN = 0.01  # part of the interval by which samples may be off
 # part of a signal's power near the line's frequency from which it is a value of the grid's wave
 _WAVEFORM = 0.5
 
-_NEAR = 0.15
+_NEAR = 0.15  # part of the line's frequency within which power is counted as near it
 # singular values below this part of the largest are noise: the resolution of 16 bits
 _LEAST_NOISE = 1e-5
 
@@ -118,10 +56,6 @@ def _noise(values: Numbers) -> float:
     beta = hankel.shape[1] / hankel.shape[0]
     factor = 0.56 * beta**3 - 0.95 * beta**2 + 1.82 * beta + 1.43
     return max(_LEAST_NOISE, float(factor * np.median(singular) / (singular[0] or 1.0)))
-
-
-def _interval(times: Numbers) -> float:
-    return float(np.median(np.diff(times))) if len(times) > 1 else 0.0
 
 
 def _check(times: Numbers, values: Numbers, line_frequency: float) -> None:
@@ -157,7 +91,7 @@ def _check(times: Numbers, values: Numbers, line_frequency: float) -> None:
 
 def _share_near(times: Numbers, values: Numbers, frequency: float) -> float:
     """Part of the power within 15 % of a frequency."""
-    interval = _interval(times)
+    interval = median_interval(times)
     deviation = (values - values.mean()) * np.hanning(len(values))
     power = np.abs(np.fft.rfft(deviation)) ** 2
     if not frequency or not power.sum() or frequency > 0.5 / interval:

@@ -6,8 +6,8 @@ import xarray as xr
 
 from orchestrator.core.errors import AnalysisError, InputError
 from orchestrator.face.api.identification import identify
+from orchestrator.studies.signals.common_times import common_times
 from orchestrator.studies.signals.comparison import compare, most_different
-from orchestrator.studies.signals.measured import common_times
 
 LABELS = ("one", "two")
 
