@@ -21,6 +21,12 @@ from orchestrator.devices.fmi.instance import open_component
 from orchestrator.devices.fmi.linear_model import EmbeddedModel, read_embedded_model
 from orchestrator.output.report.notebook import page
 
+_COLUMNS = (
+    *("causality", "variability", "type", "unit"),
+    *("start", "minimum", "maximum", "description"),
+)
+"""Columns of a table of variables: fields of `VariableInfo`."""
+
 
 class Fmu(Unchanged, Closing):
     """A running FMU at its time 0, initialised with what it was given. `open_fmu` makes it; leaving ``with`` ends it.
@@ -179,11 +185,11 @@ def open_fmu(
     Parameters
     ----------
     path
-        Of the FMU.
+        The FMU's file.
     values
         Start values of parameters and inputs.
     binding
-        File that says what its variables mean; the FMU then has the names of our port.
+        File that says what the FMU's variables mean; its inputs and outputs then have the names of our port.
     stop
         Time up to which it will be run [s], which some FMUs want to know.
 
@@ -232,17 +238,7 @@ class FmuInfo:
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor fmu info --json`` prints, as JSON's types."""
         d = self.description
-        keys = (
-            "name",
-            "type",
-            "causality",
-            "variability",
-            "unit",
-            "start",
-            "minimum",
-            "maximum",
-            "description",
-        )
+        keys = ("name", "type", *(column for column in _COLUMNS if column != "type"))
         return {
             "model_name": d.model_name,
             "title": d.title,
@@ -292,26 +288,7 @@ def info(path: str | Path) -> FmuInfo:
 def _variables(description: FmuDescription) -> pd.DataFrame:
     """The variables that an FMU declares, one row for each."""
     rows = {
-        v.name: (
-            v.causality,
-            v.variability,
-            v.type,
-            v.unit,
-            v.start,
-            v.minimum,
-            v.maximum,
-            v.description,
-        )
-        for v in description.variables.values()
+        variable.name: [getattr(variable, column) for column in _COLUMNS]
+        for variable in description.variables.values()
     }
-    columns = [
-        "causality",
-        "variability",
-        "type",
-        "unit",
-        "start",
-        "minimum",
-        "maximum",
-        "description",
-    ]
-    return pd.DataFrame.from_dict(rows, orient="index", columns=columns)
+    return pd.DataFrame.from_dict(rows, orient="index", columns=list(_COLUMNS))

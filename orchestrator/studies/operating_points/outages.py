@@ -13,7 +13,7 @@ from orchestrator.studies.operating_points.columns import Elements
 
 INTACT = "intact"  # name of the network without an outage
 _KINDS = ("n-1", "lines", "units")
-_SHOWN = 4
+_SHOWN = 4  # buses of an island that a message names
 # the name of the outage of a unit with its own transformer, ``sg3 (line_6_1)``
 _WITH_TRANSFORMER = re.compile(r"^(\S+)\s*\((\S+)\)$")
 _AUXILIARY = 0.05
@@ -83,7 +83,7 @@ def _of_kind(kind: str, elements: Elements) -> list[str]:
 
 @dataclass(frozen=True)
 class Remains:
-    none: str = ""  # why no system remains; "" where one does
+    why_none: str = ""  # why no system remains; "" where one does
     # units, loads, shunts: what is out of service or dead: without a way to the part that remains
     units: tuple[str, ...] = ()
     loads: tuple[str, ...] = ()
@@ -130,12 +130,8 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
             return Remains(
                 f"{buses} cut off, with {load:.4g} MW of load and the units {names}, which may go on alone"
             )
-    ties, joined = [], {k: k for k in set(part.values())}
-    for name, one, other in branches:
-        a, b = joined[part[one]], joined[part[other]]
-        if name in out and a != b and bool(values.get(f"{name}.connected", True)):
-            ties.append(name)
-            joined = {k: a if at == b else at for k, at in joined.items()}
+    lost = [x for x in branches if x[0] in out and bool(values.get(f"{x[0]}.connected", True))]
+    ties, joined = _ties(lost, part)
     if any(joined[part[bus]] != joined[main] for bus in dead):
         return Remains(
             f"{few(dead, _SHOWN)} cut off by branches that the case or the point has open"
@@ -161,6 +157,20 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
         ties=tuple(dict.fromkeys(ties)),
         dead=tuple(dead),
     )
+
+
+def _ties(
+    lost: Sequence[tuple[str, str, str]], part: Mapping[str, int]
+) -> tuple[list[str], dict[int, int]]:
+    """Return the lost branches on which a part of the network hangs, and of each part the one that they join it to."""
+    ties: list[str] = []
+    joined = {k: k for k in set(part.values())}
+    for name, one, other in lost:
+        a, b = joined[part[one]], joined[part[other]]
+        if a != b:
+            ties.append(name)
+            joined = {k: a if at == b else at for k, at in joined.items()}
+    return ties, joined
 
 
 def _closed(name: str, out: Sequence[str], values: Mapping[str, float | bool]) -> bool:

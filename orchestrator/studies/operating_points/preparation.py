@@ -95,8 +95,8 @@ class ItemPreparation:
         """The scenario at an item, without the units that are out of service."""
         valued = self._valued(item)
         remains = what_remains(valued, self.elements, item.out)
-        if remains.none:
-            raise IslandingError(remains.none)
+        if remains.why_none:
+            raise IslandingError(remains.why_none)
         own = tuple(name for name in item.out if name not in item.lost)
         without = what_remains(valued, self.elements, own)
         units, loads = ({*getattr(remains, k)} - {*getattr(without, k)} for k in ("units", "loads"))

@@ -17,7 +17,7 @@ from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.studies.modes.modes import ModesResult, modes_from, running
 
-_ROUNDS = 12  # in which a shift settles
+_ROUNDS = 12  # substitutions of the eigenvalue into the device's answer, each of which brings the shift nearer
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,10 @@ class SeenMode:
     impedance: Mapping[str, Vector]
 
     def shift(self, bus: str, response: Vector) -> complex:
-        """Δλ [rad/s] by a device whose current [pu, 100 MVA] answers the bus voltage [pu] so at the mode, as long as it
-        moves the mode little; what it does to its own bus is taken in."""
+        """Return Δλ [rad/s] by a device that moves the mode little.
+
+        ``response``: current [pu, 100 MVA] by bus voltage [pu] at the mode's eigenvalue, both as real and imaginary
+        part; what the device does to the voltage of its own bus is taken in."""
         at_mode = np.linalg.solve(np.eye(2) - response @ self.impedance[bus], response)
         return complex(self.drive[bus] @ at_mode @ self.shown[bus])
 
@@ -94,7 +96,7 @@ def situation_of(
 
 
 def _early(blocks: Blocks, model: LinearModel) -> Matrix:
-    """The part of B with which an input acts on what the grid gives directly, at a step's beginning."""
+    """Return the part of B by which an input acts on what the grid gives directly, at a step's beginning."""
     m, outputs, inputs = model.G.shape[1], len(blocks.output_names), len(blocks.inputs)
     direct = np.zeros((m, inputs))
     direct[:outputs] = model.K[:outputs][:, m - inputs :].toarray()
@@ -119,11 +121,11 @@ def _seen(
     )
     others = np.linalg.solve(bordered, np.vstack([B, np.zeros((1, B.shape[1]))]))[:n]
     at = {bus: slice(2 * k, 2 * k + 2) for k, bus in enumerate(buses)}
-    back = {bus: space.C[i] @ others[:, i] + space.D[i, i] / z for bus, i in at.items()}
+    impedance = {bus: space.C[i] @ others[:, i] + space.D[i, i] / z for bus, i in at.items()}
     return SeenMode(
         label,
         mode,
         {b: drive[i] for b, i in at.items()},
         {b: shown[i] for b, i in at.items()},
-        back,
+        impedance,
     )

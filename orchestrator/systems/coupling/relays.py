@@ -1,7 +1,8 @@
 """Relays that watch a bus in a run and order events: trips of units, of buses, and shedding of loads.
 
-A relay picks up at a look at which its quantity is beyond a limit, and forgets that at one at which it is not. After
-its delay it orders its events, which happen when the breaker has opened; then nothing takes the order back."""
+The relays look at their buses at regular times. A relay picks up when it sees its quantity beyond a limit, and forgets
+that when it sees it within again. If it was beyond for the relay's delay, the relay trips: it orders its events, which
+happen when the breaker has opened. Nothing takes an order back."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -240,17 +241,18 @@ class Relays:
             self._spans[int(k)].append([begin, end])
 
 
-def _follow_angles(state: Any, angle: Numbers, elapsed: float, tells: Numbers) -> Numbers:
+def _follow_angles(state: Any, angle: Numbers, elapsed: float, has_angle: Numbers) -> Numbers:
     """Move the filtered frequencies by what the angles moved in a time [s], and return them beside the rated one [Hz].
 
-    The jump of an event takes no time, and where ``tells`` is not true the angle says nothing."""
+    The jump of an event takes no time. A frequency stays where ``has_angle`` is false: there the voltage
+    is too low for an angle."""
     turned = (angle - state[:, _ANGLE] + pi) % (2 * pi) - pi
     state[:, _ANGLE] = angle
     slip = state[:, _SLIP]
     if elapsed > 0:
         kept = exp(-elapsed / FREQUENCY_LAG)
         moved = kept * slip + (1 - kept) * turned / (2 * pi * elapsed)
-        slip[:] = np.where(tells, moved, slip)
+        slip[:] = np.where(has_angle, moved, slip)
     return np.asarray(slip)
 
 
