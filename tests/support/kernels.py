@@ -44,8 +44,12 @@ def taped(model, content=None):
     )
     assert fault is None, fault
     workspace = (ctypes.c_double * library.workspace_size(tape))()
-    library.begin(tape, workspace)
-    return _bound(library, workspace, tape=tape)  # as long as the instance
+
+    def begin():
+        library.begin(tape, workspace)
+
+    begin()
+    return _bound(library, workspace, begin=begin)  # which holds the tape
 
 
 def in_python(model):

@@ -120,6 +120,9 @@ def test_derivatives_of_a_network_agree_in_both_directions_and_with_differences(
     forward = host.fmu.getDirectionalDerivative(follows, known, direction.tolist())
     back = host.fmu.getAdjointDerivative(follows, known, seeds.tolist(), len(known))
     assert seeds @ forward == pytest.approx(direction @ back, rel=1e-12)
+    # nothing is left of them where both are asked for again
+    assert host.fmu.getDirectionalDerivative(follows, known, direction.tolist()) == forward
+    assert host.fmu.getAdjointDerivative(follows, known, seeds.tolist(), len(known)) == back
     difference = (at_point(start + h * direction) - at_point(start - h * direction)) / (2 * h)
     np.testing.assert_allclose(forward, difference, rtol=0, atol=1e-8 * np.abs(difference).max())
     assert np.count_nonzero(forward) > len(follows) / 2

@@ -182,3 +182,67 @@ def test_a_change_that_is_undone_gives_the_first_answer_again(models, kernels):
         kernel.outputs(z)
         seen.append(z[at["b8.v_im"]])
     assert seen[0] == seen[2] != seen[1]
+
+
+def following():
+    """Two buses behind an admittance that a parameter and an input set, with a state that follows a voltage."""
+    m = ModelBuilder("following", "A state that follows a voltage of a network")
+    g = m.parameter("g", 2.0, "1", "Admittance between the buses", tunable=True)
+    b = m.input("b", "1", "Admittance to earth", start=1.0)
+    i = m.input("i", "1", "Current", start=0.5)
+    x = m.state("x", 0.1 * g, "1", "State")
+    between = (g, -3.0 * g)
+    elements = {(k, j): between for k in (0, 1) for j in (0, 1)}
+    elements[0, 1] = elements[1, 0] = (-g, 3.0 * g)
+    elements[1, 1] = (g, b - 3.0 * g)
+    voltages = m.nodes(elements, [(i, x), (0.2 * x, i * g)])
+    m.derivative(x, voltages[1][0] - x)
+    for k, (re, im) in enumerate(voltages):
+        m.output(f"v{k}_re", re, "1", "Voltage, real part")
+        m.output(f"v{k}_im", im, "1", "Voltage, imaginary part")
+    return m.build()
+
+
+ACTS = ("parameter", "input", "given input", "state", "state too", "nan", "undo", "other", "step")
+ASKED = ("outputs", "derivatives", "requirements", "initialise", "nothing")
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_voltages_that_are_kept_are_those_at_the_point(seed):
+    """Whatever was set, undone, stepped or asked for before, in two instances' vectors by turns, to the last bit."""
+    model, rng = following(), np.random.default_rng(seed)
+    at, kernel, fresh = model.value_references, taped(model), taped(model)
+    places = {"parameter": at["g"], "input": at["i"], "given input": at["b"]}
+    places |= dict.fromkeys(("state", "state too"), at["x"])
+    z, other = vector(model), vector(model, g=1.5)
+    for one in (z, other):
+        kernel.initialise(one)
+    seen, before = set(), list(z)
+    for act in rng.choice(ACTS, 150):
+        kept = list(z)
+        if act in places:
+            z[places[act]] = rng.choice([0.0, -0.0, 0.7, 1.3])
+        elif act == "nan":
+            z[at["i"]] = math.nan
+        elif act == "undo":
+            z[:] = before
+        elif act == "other":
+            z, other = other, z
+        else:
+            kernel.advance(z, 1e-2, 2)
+        before = kept
+        asked = rng.choice(ASKED)
+        if asked == "requirements":
+            kernel.requirements(z, vector(model))
+        elif asked != "nothing":
+            getattr(kernel, asked)(z)
+        alone = vector(model)
+        alone[:] = z
+        for ask in (fresh.derivatives, fresh.outputs):
+            fresh.begin()
+            ask(alone)
+        for name in rng.permutation(["outputs", "derivatives"]):
+            getattr(kernel, name)(z)
+        assert bytes(z) == bytes(alone), (act, asked)
+        seen.add(bytes(z))
+    assert len(seen) > 40

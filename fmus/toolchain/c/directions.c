@@ -163,7 +163,8 @@ static void seed_voltages(double *w, double *seed) {
     move_back(w, CURRENTS, seed);
 }
 
-/* Everything that derivatives at z need, but for the sections that are asked for. */
+/* Everything that derivatives at z need, but for the sections that are asked for. Voltages are always solved for: a
+   direction takes them in the order of elimination too, where the one before left its own. */
 static void settle(double *w, const double *z) {
     enter(z, w);
     memcpy(SLOT + X, z + X, NX * sizeof *z);

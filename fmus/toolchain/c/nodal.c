@@ -115,4 +115,5 @@ static void solve_nodes(double *w) {
         v[PERM[i]] = s[2 * i];
         v[NB + PERM[i]] = s[2 * i + 1];
     }
+    OF(w)->settled = 1;
 }

@@ -87,23 +87,33 @@ static void evaluate(double *w, int which, double *value) {
     take(w, which, 0, OF(w)->size.section[which].results, value);
 }
 
-/* Parameters, what they fix, and inputs in their slots. Bytes are compared: a NaN is equal to itself, -0.0 not to 0.0. */
+/* Put n numbers into the slots from `first` on. Voltages are no longer those at the slots if one of them differs. Bytes
+   are compared: a NaN is equal to itself, -0.0 not to 0.0. */
+static void fill(double *w, int first, const double *value, int n) {
+    if (!memcmp(SLOT + first, value, n * sizeof *value)) return;
+    memcpy(SLOT + first, value, n * sizeof *value);
+    OF(w)->settled = 0;
+}
+
+/* Parameters, what they fix, and inputs in their slots. */
 static void enter(const double *z, double *w) {
     if (!OF(w)->known || memcmp(SLOT, z, U * sizeof *z)) {
         memcpy(SLOT, z, U * sizeof *z);
         execute(w, FIXED, SLOT + AT_FIXED);
         OF(w)->known = 1;
+        OF(w)->settled = 0;
     }
-    memcpy(SLOT + U, z + U, NU * sizeof *z);
+    fill(w, U, z + U, NU);
 }
 
 #include "nodal.c"
 
-/* A function of states, at the voltages that these give. */
+/* A function of states, at the voltages that these give. Outputs and rates are often asked for at one point, and outputs
+   again by a step of a network without states: its voltages are found once. */
 static void at_states(double *w, int which, const double *x, double *value) {
     if (!OF(w)->size.section[which].results) return; /* most phasor networks have no states */
-    memcpy(SLOT + X, x, NX * sizeof *x);
-    if (NB) solve_nodes(w);
+    fill(w, X, x, NX);
+    if (NB && !OF(w)->settled) solve_nodes(w);
     evaluate(w, which, value);
 }
 

@@ -39,6 +39,7 @@ struct tape {
     struct sizes size;
     double largest_rest; /* part of its terms that a row of Y v = i may leave over; with more, no voltage is finite */
     int known; /* whether the slots of p and c, and those that they fix, are filled */
+    int settled; /* whether the slots of v hold the voltages at what the slots of p, c, u and x hold */
     const int32_t *stepwise, *given_at, *perm, *row, *col, *diag, *mrow, *mcol;
     const uint32_t *run[SECTIONS], *result[SECTIONS], *operand[SECTIONS]; /* run: code and length of each */
 };
