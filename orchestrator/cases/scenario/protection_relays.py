@@ -57,11 +57,17 @@ def take_relays(draft: Draft, records: Sequence[DynamicRecord]) -> TakenRelays:
     for relay in unit_relays(records):
         bus, name = relay.machine
         label = labels.get(relay.machine)
-        if label is None:
+        if relay.machine in data.idle_machines:
             why = f"a relay of the machine {name!r} at bus {bus}, which is not in service"
             unused[_place(relay.record)] = why
+        elif label is None:
+            why = f"a relay of the machine {name!r} at bus {bus}, which the RAW file does not have"
+            unused[_place(relay.record)] = why
+            _ask_whose(draft, relay.record, why, "the bus or identifier of its machine")
         elif bus_name(str(relay.watched)) not in data.buses:
-            unused[_place(relay.record)] = f"a relay of bus {relay.watched}, which is no bus here"
+            why = f"a relay of bus {relay.watched}, which is no bus here"
+            unused[_place(relay.record)] = why
+            _ask_whose(draft, relay.record, why, "the bus that it watches")
         else:
             taken.append((label, relay))
     loads = {load.name for load in data.loads}
@@ -73,6 +79,13 @@ def take_relays(draft: Draft, records: Sequence[DynamicRecord]) -> TakenRelays:
     draft.unit_relays, draft.load_relays = taken, of_loads
     used = [*(relay.record for _, relay in taken), *(relay.record for relay in of_loads)]
     return TakenRelays(frozenset(map(_place, used)), unused)
+
+
+def _ask_whose(draft: Draft, record: DynamicRecord, why: str, what: str) -> None:
+    """Ask about a relay that no run has, as it is of nothing in the network."""
+    text = f"{record.name} is not used: {why}, so that it never trips; correct {what}"
+    topic = QuestionTopic("a relay of nothing in the network", record.name)
+    draft.found.questions.append(Problem(record.place, text, topic=topic))
 
 
 def _place(record: DynamicRecord) -> Place:

@@ -15,7 +15,7 @@ from orchestrator.studies.runs.files import summary_of
 from orchestrator.studies.runs.like import run_like
 from orchestrator.studies.runs.run import run_scenario
 from orchestrator.systems.coupling.relays import FREQUENCY_LAG, Relays
-from tests.support.mill import mill_case
+from tests.support.mill import RAW, mill_case
 from tests.support.scenarios import prepare_one
 
 LINE = 0.01 + 0.1j
@@ -202,13 +202,29 @@ def test_what_relays_know_goes_on_with_a_run_that_is_taken_up(prepared):
     assert again.trips == trips
 
 
-def test_a_relay_of_what_is_not_there_is_listed_and_not_used(prepared):
+def test_a_relay_of_what_is_not_there_is_not_used_and_asked_about(prepared):
     ready = prepared(["1 'VTGTPAT' 2 7 '1' 0.8 9 0.05 0", "2 'VTGTPAT' 9 2 '1' 0.8 9 0.05 0"])
     first, second = (use for use in ready.records if use.kind == "VTGTPAT")
-    assert first.why == "a relay of the machine '1' at bus 7, which is not in service"
+    assert first.why == "a relay of the machine '1' at bus 7, which the RAW file does not have"
     assert second.why == "a relay of bus 9, which is no bus here"
     assert first.use is second.use is UseOfRecord.NOT_USED
     assert ready.relays == ()
+    asked = [one.text for one in ready.questions if one.text.startswith("VTGTPAT")]
+    assert len(asked) == 2
+    for text, use in zip(asked, (first, second), strict=True):
+        assert text.startswith(f"VTGTPAT is not used: {use.why}, so that it never trips; correct")
+
+
+def test_a_relay_of_a_machine_out_of_service_is_listed_and_not_asked_about(tmp_path):
+    idle = (
+        RAW.splitlines()[11].replace("2, '1'", "2, 'B'").replace("1.0, 1, 100.0", "1.0, 0, 100.0")
+    )
+    raw = RAW.replace("0 / END OF GENERATOR", f"{idle}\n0 / END OF GENERATOR")
+    out = mill_case(tmp_path, ["2 'VTGTPAT' 2 2 'B' 0.8 9 0.05 0"], raw=raw)
+    ready = prepare_one(out, "base", {}, None, 1.0)
+    (use,) = (use for use in ready.records if use.kind == "VTGTPAT")
+    assert use.why == "a relay of the machine 'B' at bus 2, which is not in service"
+    assert not any("VTGTPAT" in question.text for question in ready.questions)
 
 
 def exported(ready, tmp_path):

@@ -16,6 +16,9 @@ _HELD_BUS = "IB"
 _LEAST_SIGNALS = ("uel.V_UIMIN", "uel.V_ULMIN")
 """Lower limits of a limiter's signal [pu]; the higher one counts."""
 
+_INVERSE_TIME = (("oel.EFD1", "oel.TIME1"), ("oel.EFD2", "oel.TIME2"), ("oel.EFD3", "oel.TIME3"))
+"""Points of MAXEX1's and MAXEX2's inverse time: field [of the rated one], and the time there [s]."""
+
 _SAME = 1e-3  # part by which two figures for one reactance may differ: files round them
 
 
@@ -25,6 +28,7 @@ def doubts_of_machine(
     yield from _omissions(records)
     yield from _chosen_limits(records)
     yield from _offsets(records, values)
+    yield from _inverse_times(records, values)
     x_d2, x_source = values.get("machine.X_d2"), machine.source.imag
     if x_d2 is None or abs(x_source - x_d2) <= _SAME * abs(x_d2):
         return
@@ -64,6 +68,37 @@ def _offsets(
         "before its limit; where it is added VULMIN is 0, at a gate far below: correct VULMIN, or the exciter's record"
     )
     yield DoubtOfRecord("uel.V_ULMIN", record.place, text, "a limiter that rests below 0 at a sum")
+
+
+def _inverse_times(
+    records: Sequence[DynamicRecord], values: Mapping[str, float]
+) -> Iterator[DoubtOfRecord]:
+    """Ask about a limiter of overexcitation whose points contradict each other."""
+    points = [(values[field], values[time]) for field, time in _INVERSE_TIME if time in values]
+    if not points:
+        return
+    record = next(record for record in records if "oel.EFD1" in _sets(record.name))
+    fields, times = zip(*points, strict=True)
+    wanted = values["oel.EFDDES"]
+    listed = ", ".join(f"{time:g} s at {field:g}" for field, time in points)
+    if list(fields) != sorted(fields):
+        text = (
+            f"{record.name} has points of its inverse time whose EFD do not rise ({listed}): it starts beyond the "
+            f"first alone, {fields[0]:g} times EFDRATED; order EFD1, EFD2 and EFD3 upward, each with its time"
+        )
+        yield DoubtOfRecord("oel.EFD1", record.place, text, "points of a limiter out of order")
+    elif list(times) != sorted(times, reverse=True):
+        text = (
+            f"{record.name} waits the longer the higher the field is ({listed}), and an inverse time falls: look at "
+            "TIME1, TIME2 and TIME3"
+        )
+        yield DoubtOfRecord("oel.TIME1", record.place, text, "a limiter's time that rises")
+    if wanted > fields[0]:
+        text = (
+            f"{record.name} has EFDDES = {wanted:g} above EFD1 = {fields[0]:g}: once it acts it lets the field stay "
+            "beyond the point from which its time runs; look at EFDDES"
+        )
+        yield DoubtOfRecord("oel.EFDDES", record.place, text, "a limiter's aim beyond its limit")
 
 
 def _sets(name: str) -> set[str]:

@@ -115,6 +115,28 @@ def test_the_input_of_uel1_that_is_left_out_is_asked_about(tmp_path):
     assert any("UEL1 has KUF = 3.3: the input of the exciter's" in d.text for d in model.doubts)
 
 
+@pytest.mark.parametrize(
+    ("points", "aim", "variables"),
+    [
+        ("1.1 120 1.2 40 1.5 15", 1.0, []),
+        ("1.1 120 1.1 120 1.1 120", 1.1, []),
+        ("1.5 15 1.2 40 1.1 120", 1.0, ["oel.EFD1"]),
+        ("1.1 15 1.2 40 1.5 120", 1.0, ["oel.TIME1"]),
+        ("1.1 120 1.2 40 1.5 15", 1.3, ["oel.EFDDES"]),
+    ],
+    ids=["as typed", "one point", "out of order", "time rises", "aims beyond"],
+)
+@pytest.mark.parametrize("start", ["1 'MAXEX1' 1", "1 'MAXEX2' 1 0"])
+def test_an_inverse_time_that_contradicts_itself_is_asked_about(
+    start, points, aim, variables, tmp_path
+):
+    record = f"{start} 2.5 {points} {aim} 0.002 -0.5 /\n"
+    model, _, _ = read(tmp_path, GENROU + SEXS + record)
+    asked = [doubt for doubt in model.doubts if doubt.variable.startswith("oel.")]
+    assert [doubt.variable for doubt in asked] == variables
+    assert all(doubt.text.startswith(record.split("'")[1]) for doubt in asked)
+
+
 def test_a_second_limiter_of_one_kind_is_refused(tmp_path):
     with pytest.raises(Exception, match="a second oel of machine '1' at bus 1"):
         read(tmp_path, GENROU + SEXS + MAXEX1 + MAXEX2)
