@@ -2,6 +2,7 @@
 
 import argparse
 import webbrowser
+from collections.abc import Sequence
 from pathlib import Path
 from warnings import catch_warnings, simplefilter
 
@@ -63,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
         with shown_progress("Points", shown=True) as report, catch_warnings():
             simplefilter("ignore", UnusualDataWarning)  # the page has them
             save_page(options.save, case, desk, beginning, options.vary, report, further=further)
-        print(f"Written: {options.save}")
+        print(f"Written: {options.save}{_not_on_the_page(case, [name, *further])}")
         return 0
     if options.vary:
         raise InputError(
@@ -84,6 +85,13 @@ def run(options: argparse.Namespace) -> int:
     finally:
         remove(folder)
     return 0
+
+
+def _not_on_the_page(case: Case, shown: Sequence[str]) -> str:
+    others = [name for name in case.scenarios if name not in shown]
+    if not others:
+        return ""
+    return f" with {', '.join(shown)}; without {', '.join(others)}: --vary, with --scenario once for each, adds them"
 
 
 def first_shown(case: Case) -> str:

@@ -348,8 +348,8 @@ def test_a_saved_page_moves_without_a_server(browser, tmp_path, capsys):
         str(page),
     ]
     assert main(words) == 0
+    assert "page.html with pod_p; without base, gfor, pod_q, pod_pq" in capsys.readouterr().out
     with opened(browser, page.as_uri()) as view:
-        capsys.readouterr()
         assert main(["modes", "two_area", "--scenario", "pod_p", "--json"]) == 0
         content = json.loads(capsys.readouterr().out)["scenarios"][0]
         assert [row[:2] for row in rows(view)] == shown(content["modes"]), "it begins with the case"
@@ -369,7 +369,16 @@ def test_a_saved_page_moves_without_a_server(browser, tmp_path, capsys):
         assert [row[:2] for row in rows(view)] == shown(content["modes"])
         assert view.locator("#run").is_disabled()
         halfway_between_two(view, slider)
+        where_a_mode_is_not_drawn(view)
         where_nothing_is_known_between(view, slider)
+
+
+def where_a_mode_is_not_drawn(view):
+    """The least damped mode halfway may be one that no line leads to: the page says at how many values it is."""
+    assert "not drawn" not in view.evaluate("wordsOfError()")
+    said = view.evaluate("SAVED.cells[0].least = 10, wordsOfError()")
+    assert "10 at most (any drawn mode: " in said
+    assert "at 1 of them a mode that is not drawn is damped least)" in said
 
 
 def where_nothing_is_known_between(view, slider):

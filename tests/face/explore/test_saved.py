@@ -119,6 +119,18 @@ def test_between_two_values_a_straight_line_is_off_by_what_its_middle_was_comput
     )  # the control mode stays, and is damped too well to be seen
 
 
+def test_where_the_least_damped_mode_is_not_followed_its_error_exceeds_that_of_each_drawn_one():
+    """A mode that leaves at one corner is not drawn; by `least` above `most` the page knows that it hides."""
+    swing, slow = -1.0 + 10j, -0.1 + 3j
+    left, right = answer_of(swing, slow), answer_of(swing, -2.0 + 6j)
+    halfway = answer_of(swing, -0.15 + 3.5j)
+    cell = judged_cell({"p": (1.0, 2.0)}, [0, 1], [left, right], lambda point: halfway)
+    assert cell["modes"] == [[0, 0]]
+    damping = [100 / abs(1 + 10j), 15 / abs(0.15 + 3.5j)]
+    assert cell["least"] == pytest.approx(damping[0] - damping[1], rel=0.05)  # two digits of it
+    assert cell["most"] == 0.0
+
+
 def test_a_cell_whose_middle_has_no_answer_is_not_interpolated():
     def refuse(point):
         raise InputError("no steady state")

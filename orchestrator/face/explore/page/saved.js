@@ -44,7 +44,7 @@ async function dragSaved(name, value) {
   paintMap(); paintTable();
   const least = [...between].sort((a, b) => a.damping - b.damping)[0];
   $("verdict").className = "estimated";
-  $("verdict").textContent = `${name} = ${number(value)}, between computed values: least damped ≈ ${fixed(least.hz, 3)} Hz, ${fixed(least.damping, 2)} % (halfway it is off by ${number(cell.least, 2)} points${cell.hertz === undefined ? "" : ` and ${fixed(cell.hertz, 4)} Hz`}, any mode by at most ${number(cell.most, 2)}); computed on release`;
+  $("verdict").textContent = `${name} = ${number(value)}, between computed values: least damped ≈ ${fixed(least.hz, 3)} Hz, ${fixed(least.damping, 2)} % (halfway it is off by ${number(cell.least, 2)} points${cell.hertz === undefined ? "" : ` and ${fixed(cell.hertz, 4)} Hz`}, any drawn mode by at most ${number(cell.most, 2)}${cell.least > cell.most ? "; a mode that is not drawn is damped least there" : ""}); computed on release`;
   painted(begin, "estimate");
 }
 // The followed modes of a cell, on straight lines between its corners.
@@ -72,7 +72,8 @@ async function setSaved(name, value) {
 function wordsOfError() {
   if (!SAVED.cells.length) return "";
   const sorted = key => SAVED.cells.map(one => one[key]).sort((a, b) => a - b), least = sorted("least"), most = sorted("most"), last = most.length - 1;
-  return `While you drag, ≈ is interpolated: at ${most.length} values halfway, computed to know it, the least damped mode was off by ${number(least[last >> 1], 2)} points of damping as a rule and ${number(least[last], 2)} at most (any mode: ${number(most[last], 2)}). On release the nearest computed value is shown.`;
+  const hidden = SAVED.cells.filter(one => one.least > one.most).length;
+  return `While you drag, ≈ is interpolated: at ${most.length} values halfway, computed to know it, the least damped mode was off by ${number(least[last >> 1], 2)} points of damping as a rule and ${number(least[last], 2)} at most (any drawn mode: ${number(most[last], 2)}${hidden ? `; at ${hidden} of them a mode that is not drawn is damped least` : ""}). On release the nearest computed value is shown.`;
 }
 // Damping of the least damped mode [%], below 0 where the system is unstable.
 function leastDampingOf(answer) {
