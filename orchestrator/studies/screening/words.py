@@ -218,8 +218,15 @@ def what_was_counted(summary: Summary) -> str:
         f"below {100 * wanted.damping:g} % damping, of the "
         f"{_what_was_linearised(summary)}: found anew at {searched} of {computed} points and outages"
         f"{others}. Whether something grows at other frequencies was counted at "
-        f"{summary.counted_items} of {computed}{large}."
+        f"{summary.counted_items} of {computed}{large}.{_outages_not_asked(summary)}"
     )
+
+
+def _outages_not_asked(summary: Summary) -> str:
+    """Say that only the intact network was looked at, which else reads as if each outage were harmless."""
+    if len(summary.result.plan.outages) > 1:
+        return ""
+    return " No outage was asked for; --outages n-1 takes each line and each unit out."
 
 
 def _what_was_linearised(summary: Summary) -> str:

@@ -93,6 +93,15 @@ def test_the_scenario_is_named(screened):
     assert what_was_counted(Summary(screened)).startswith("Scenario gfor: modes from 1 to 2 Hz")
 
 
+def test_a_screening_without_outages_says_that_it_has_none(screened):
+    """Who forgets to ask for them would else take the verdict for the answer to a line that is out."""
+    assert "No outage was asked for" in what_was_counted(Summary(screened))
+    plan = screened.plan
+    lost = replace(plan.outages[0], name="line")
+    asked = replace(screened, plan=replace(plan, outages=(*plan.outages, lost)))
+    assert "No outage" not in what_was_counted(Summary(asked))
+
+
 def test_a_warning_names_its_first_point(screened):
     items = [
         replace(item, record=replace(item.record, warnings=("a limit is close",)))
