@@ -77,7 +77,7 @@ def page(
     ]
     charts = (re.search(_PICTURE, text, re.DOTALL) for _, text in content)
     picture = next((found[0] for found in charts if found), "")
-    first = "<p>Its picture stands on the first page.</p>"
+    first = "<p>Its picture stands at the top of this page.</p>"
     if picture:
         content = [(heading, text.replace(picture, first)) for heading, text in content]
     content = [] if short else content
