@@ -16,6 +16,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.linalg import lapack
 
 from orchestrator.core.arrays import Matrix, Vector
 
@@ -119,10 +120,10 @@ class _Whole:
     lu: tuple[Matrix, Places]
 
     def solve(self, right: Vector) -> Vector:
-        return np.asarray(scipy.linalg.lu_solve(self.lu, right, check_finite=False))
+        return through_lu(self.lu, right)
 
     def solve_adjoint(self, right: Vector) -> Vector:
-        return np.asarray(scipy.linalg.lu_solve(self.lu, right, trans=2, check_finite=False))
+        return through_lu(self.lu, right, adjoint=True)
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,7 @@ class _Tied:
         first, second = self.halves
         one, other = first.solve(right[: self.cut]), second.solve(right[self.cut :])
         through = np.concatenate([self.V[0] @ other, self.V[1] @ one])
-        through = scipy.linalg.lu_solve(self.lu, through, check_finite=False)
+        through = through_lu(self.lu, through)
         ties = len(self.V[0])
         return np.concatenate(
             [one - self.X[0] @ through[:ties], other - self.X[1] @ through[ties:]]
@@ -149,7 +150,7 @@ class _Tied:
         first, second = self.halves
         one, other = right[: self.cut], right[self.cut :]
         through = np.concatenate([self.X[0].conj().T @ one, self.X[1].conj().T @ other])
-        through = scipy.linalg.lu_solve(self.lu, through, trans=2, check_finite=False)
+        through = through_lu(self.lu, through, adjoint=True)
         ties = len(self.V[0])
         return np.concatenate(
             [
@@ -222,6 +223,19 @@ def times(real: Matrix | sp.csr_array, vector: Vector) -> Vector:
     columns = vector.reshape(len(vector), vector.shape[1] if vector.ndim == 2 else 1)
     product = real @ np.ascontiguousarray(columns).view(float)
     return np.ascontiguousarray(product).view(complex).reshape(real.shape[0], *vector.shape[1:])
+
+
+def through_lu(lu: tuple[Matrix, Places], right: Vector, *, adjoint: bool = False) -> Vector:
+    """Solve by the factors of `scipy.linalg.lu_factor`, right sides of shape (n, c).
+
+    SciPy's ``lu_solve`` does the same, but takes longer to look at its arguments than a small part takes to solve."""
+    factors, pivots = lu
+    if not right.size:
+        return np.empty(right.shape, dtype=np.result_type(factors, right))
+    is_complex = np.iscomplexobj(factors) or np.iscomplexobj(right)
+    solve = lapack.zgetrs if is_complex else lapack.dgetrs
+    found, _ = solve(factors, pivots, right, trans=2 if adjoint else 0)
+    return np.asarray(found)
 
 
 def divide(

@@ -22,7 +22,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Matrix, Vector
-from orchestrator.linear.models.divided_hub import DividedHub, divide, times
+from orchestrator.linear.models.divided_hub import DividedHub, divide, through_lu, times
 from orchestrator.linear.models.separate_blocks import (
     BlockFactors,
     SeparateBlocks,
@@ -64,10 +64,10 @@ class DenseHub:
     entering: Matrix  # R
 
     def solve(self, right: Vector) -> Vector:
-        return np.asarray(scipy.linalg.lu_solve(self.lu, right, check_finite=False))
+        return through_lu(self.lu, right)
 
     def solve_adjoint(self, right: Vector) -> Vector:
-        return np.asarray(scipy.linalg.lu_solve(self.lu, right, trans=2, check_finite=False))
+        return through_lu(self.lu, right, adjoint=True)
 
     def taken_in(self, x: Vector) -> Vector:
         return times(self.entering, x)

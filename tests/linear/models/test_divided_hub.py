@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.linalg
 import scipy.sparse as sp
 
 from orchestrator.linear.models import divided_hub, hub_elimination, linear_model
@@ -155,3 +156,25 @@ def test_left_vectors_that_are_none_or_of_other_eigenvalues_are_noticed(wrong, m
     search.reaching(0.6)
     assert_left(model, search.pairs([0, 1]))
     assert len(begun) == 2
+
+
+@pytest.mark.parametrize("kind", [float, complex])
+@pytest.mark.parametrize("right_kind", [float, complex])
+def test_a_solution_through_factors_is_scipys(kind, right_kind):
+    """To the last bit, of one right side or many, of none, and of the adjoint; the right side stays as it is."""
+    rng = np.random.default_rng(3)
+
+    def drawn(kind, *shape):
+        parts = rng.standard_normal((2, *shape))
+        return parts[0] + 1j * parts[1] if kind is complex else parts[0]
+
+    lu = scipy.linalg.lu_factor(drawn(kind, 30, 30))
+    for columns in (0, 1, 7):
+        right = drawn(right_kind, 30, columns)
+        given = right.copy()
+        for adjoint in (False, True):
+            found = divided_hub.through_lu(lu, right, adjoint=adjoint)
+            wanted = scipy.linalg.lu_solve(lu, given, trans=2 if adjoint else 0)
+            assert (found.dtype, found.shape) == (wanted.dtype, wanted.shape)
+            assert found.tobytes() == wanted.tobytes()
+            assert np.array_equal(right, given)
