@@ -45,6 +45,7 @@ class _Adapter(ctypes.Structure):
         ("set_real", ctypes.c_void_p),
         ("get_real", ctypes.c_void_p),
         ("step", ctypes.c_void_p),
+        ("steps", ctypes.c_void_p),
         ("others", ctypes.c_void_p),
         ("n_others", ctypes.c_int64),
         ("voltage", _Port),
@@ -69,11 +70,7 @@ class BoundComponent(Derived):
     def __init__(self, inner: Component, description: BoundDescription) -> None:
         self.name, self.description, self.inner = inner.name, description, inner
         self._port, self._inner_names = description.port, description.inner_names
-        self._start: dict[str, float] = {
-            name: description.variables[name].start_number
-            for name in START
-            if name in description.variables
-        }
+        self._start = self._delivered_start()
         self._start_is_new = True
         self._adapter = _Adapter()
         self._fill()
@@ -85,6 +82,11 @@ class BoundComponent(Derived):
         self.get_real = exchange(("adapter_get_real", library))
         self.do_step = ctypes.PYFUNCTYPE(ctypes.c_int, address, real, real, flag)(
             ("adapter_do_step", library)
+        )
+        many = ctypes.PYFUNCTYPE(ctypes.c_int, address, address, address)
+        self.many_steps = many(("adapter_many_steps", library))
+        self._takes_many = ctypes.PYFUNCTYPE(ctypes.c_int, address, address)(
+            ("adapter_takes_many", library)
         )
         try:
             self.set(self._port.settings, own=True)
@@ -98,6 +100,8 @@ class BoundComponent(Derived):
         for field in ("set_real", "get_real"):
             setattr(adapter, field, ctypes.cast(getattr(self.inner, field), ctypes.c_void_p))
         adapter.step = ctypes.cast(self.inner.do_step, ctypes.c_void_p)
+        if self.inner.many_steps is not None:
+            adapter.steps = ctypes.cast(self.inner.many_steps, ctypes.c_void_p)
         self._others = (_Other * max(1, len(self._inner_names)))()
         for other, (name, own) in zip(self._others, self._inner_names.items(), strict=False):
             signal = self._port.signals.get(name)
@@ -129,6 +133,9 @@ class BoundComponent(Derived):
 
     def _factor(self, signal: SignalMap) -> float:
         return signal.factor_at(self._start["S_n"] / self._port.rating)
+
+    def takes_many(self, steps: ctypes.Structure) -> bool:
+        return bool(self._takes_many(self.pointer, ctypes.addressof(steps)))
 
     @property
     def one_thread(self) -> str | None:
@@ -274,6 +281,23 @@ class BoundComponent(Derived):
     def reset(self) -> None:
         """Back to where it was after instantiation; the start values are sent again."""
         self.inner.reset()
+        self._begin_again()
+
+    @property
+    def renewable(self) -> bool:
+        return self.inner.renewable
+
+    def renew(self) -> None:
+        self.inner.renew()
+        self._start = self._delivered_start()
+        self._scale()
+        self._begin_again()
+
+    def _delivered_start(self) -> dict[str, float]:
+        variables = self.description.variables
+        return {name: variables[name].start_number for name in START if name in variables}
+
+    def _begin_again(self) -> None:
         self._adapter.v[:] = (1.0, 0.0)
         self._adapter.time = self._adapter.angle = 0.0
         self._start_is_new = True

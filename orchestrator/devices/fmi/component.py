@@ -25,6 +25,11 @@ class Component(Protocol):
     set_real: Any
     get_real: Any
     do_step: Any
+    # as ``many_steps`` of many_steps.h, callable from C; None where each step is a call of its own
+    many_steps: Any
+
+    def takes_many(self, steps: ctypes.Structure) -> bool:
+        """Return whether ``many_steps`` makes these steps."""
 
     @property
     def held_states(self) -> tuple[str, ...]:
@@ -61,6 +66,13 @@ class Component(Protocol):
 
     def reset(self) -> None:
         """Back to where it was after instantiation."""
+
+    @property
+    def renewable(self) -> bool:
+        """Return whether `renew` makes a new instance, as it does in a process of its own."""
+
+    def renew(self) -> None:
+        """Free the instance and its library, and make a new one in the same process."""
 
     def close(self) -> None:
         """Terminate and free the instance, and remove what was made for it."""
@@ -111,10 +123,21 @@ class Derived(Closing):
     """Methods of a component that use its other methods alone."""
 
     held_states: tuple[str, ...] = ()
+    many_steps: Any = None
+
+    def takes_many(self, steps: ctypes.Structure) -> bool:
+        return self.many_steps is not None
 
     @property
     def one_thread(self) -> str | None:
         return "in a process of its own"
+
+    @property
+    def renewable(self) -> bool:
+        return False
+
+    def renew(self: Component) -> None:
+        raise InputError(f"component {self.name!r} is opened anew instead of being renewed")
 
     def hold(self: Component, states: Sequence[str]) -> None:
         whole: FmuDescription = vars(self).setdefault("_with_all_states", self.description)

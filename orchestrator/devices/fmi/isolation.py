@@ -1,7 +1,7 @@
 """An FMU in a process of its own, called as if it were in this one.
 
 A crash, a hang, an exit or a flood in it becomes one `ComponentError`; what was computed until then stays. Values pass
-through shared memory (`mailbox.c`), one exchange for a communication step."""
+through shared memory (`mailbox.c`), one exchange for a communication step, or for many of a known input."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -25,6 +25,8 @@ from orchestrator.devices.fmi.mailbox import DIED, HUNG, INTERRUPTED, NOT_A_NUMB
 from orchestrator.devices.fmi.protection import Protection
 from orchestrator.devices.fmi.refusal import refusal
 from orchestrator.devices.fmi.remote_calls import Form, RemoteCalls
+
+_TO_END = 5.0  # time for an FMU to free its instance [s]
 
 
 class IsolatedComponent(RemoteCalls):
@@ -52,6 +54,7 @@ class IsolatedComponent(RemoteCalls):
         self.set_real = self._box.function("client_set_real", c_void_p, c_size_t, c_void_p)
         self.get_real = self._box.function("client_get_real", c_void_p, c_size_t, c_void_p)
         self.do_step = self._box.function("client_do_step", c_double, c_double, c_int)
+        self.many_steps = self._box.function("client_many_steps", c_void_p, c_void_p)
 
     def _start(self, directory: Path) -> None:
         fmu = self.description.path.resolve()
@@ -158,14 +161,24 @@ class IsolatedComponent(RemoteCalls):
         )
         return self._typed(matrix, found, len(unknowns), len(knowns))
 
+    @property
+    def renewable(self) -> bool:
+        return not runs_under_wine(self.description)
+
+    def renew(self) -> None:
+        self._box.client.patience = min(self.limits.seconds, _TO_END)
+        self._remote("fmi2FreeInstance", "release")
+        self._box.client.patience = self.limits.seconds
+        self._remote("fmi2Instantiate", "instantiate")
+
     def close(self) -> None:
         process = self._process
         if process is not None and self._end is None and process.running:
-            self._box.client.patience = min(self._box.client.patience, 5.0)
+            self._box.client.patience = min(self._box.client.patience, _TO_END)
             # an FMU that failed may not end by itself
             with suppress(ComponentError, InputError, ValueError):
                 self._remote("fmi2Terminate", "close")
-                process.wait(5.0)
+                process.wait(_TO_END)
         self._end = self._end or "closed"
         if process is not None:
             process.close()

@@ -3,14 +3,14 @@
    the client needs to know for itself, and where in this memory it writes, stands in memory of its own (struct client).
 
    What is set waits until a step or a reading needs it, and a step brings the values along that were read after the
-   last one: a communication step costs one exchange between the processes and not three. Many steps of one of several
-   instances may be asked for at once (RUN). */
+   last one: a communication step costs one exchange between the processes and not three. Many steps may be asked for
+   at once (RUN): of the instance, or of one of several. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "clock.h"
-#include "fmi.h"
+#include "many_steps.h"
 #include "waiting.h"
 
 #ifdef UNDER_WINE /* which only answers */
@@ -38,7 +38,7 @@ enum { MOST = 16384, TEXT = 1 << 24, LOG = 8192, ROOM = 1 << 18 };
 enum { OK = 0, REFUSED = 3, DIED = 64, HUNG = 65, NOT_A_NUMBER = 66, INTERRUPTED = 67, TAMPERED = 68 };
 enum { MOST_STATUS = 5 }; /* of FMI's */
 enum { EXCHANGE = 1, TALK = 2, RUN = 3 };
-enum { SET = 1, STEP = 2, GET = 4 };
+enum { SET = 1, STEP = 2, GET = 4 }; /* what an exchange does, and the stage of a run */
 
 struct mailbox {
     volatile int32_t request, reply; /* numbers of the newest question and of the newest answer */
@@ -52,9 +52,10 @@ struct mailbox {
     double set_values[MOST], got[MOST];
     char text[TEXT];
     char log[LOG];
-    /* RUN: `n_rows` rows of inputs in `room`, then a row of outputs for each step, or one for none; then the network of
-       `n_network` states around the instance, if it has one: x, A, B, C. */
-    int64_t instance, n_steps, n_rows, n_in, n_out, n_network;
+    /* RUN: `n_rows` rows of inputs in `room`, then `n_late` rows that are set after each step, before it is read, then a
+       row of outputs for each step, or one for none; then the network of `n_network` states around the instance, if it
+       has one: x, A, B, C. */
+    int64_t instance, n_steps, n_rows, n_in, n_out, n_network, n_late;
     int64_t done, stage; /* steps that are finished; what it is at: SET, STEP or GET */
     double room[ROOM];
 };
@@ -123,17 +124,20 @@ static int answer_in(const struct mailbox *box) {
     return status < OK || status > MOST_STATUS ? TAMPERED : status;
 }
 
-/* Ask, and wait for the answer: the call's status, or DIED, HUNG, INTERRUPTED or TAMPERED. */
-static int ask(struct client *client, int32_t kind) {
+/* Ask, and wait for the answer: the call's status, or DIED, HUNG, INTERRUPTED or TAMPERED. With each of so many steps
+   (`may_step`) the patience begins anew. */
+static int ask(struct client *client, int32_t kind, int64_t may_step) {
     struct mailbox *box = client->box;
     const int32_t before = client->number;
     client->number = next_number(before);
     box->kind = kind;
     publish(&box->request, client->number, &box->sleeping[0]);
-    const double end = seconds() + client->patience;
+    double end = seconds() + client->patience;
+    int32_t steps = box->steps;
     double last = 0; /* moment for an answer after Ctrl-C */
     while (!changed(&box->reply, before, &box->sleeping[1])) {
         if (is_gone(client->peer)) return box->reply == client->number ? answer_in(box) : DIED;
+        if (may_step > 0 && box->steps != steps) steps = box->steps, end = seconds() + client->patience, --may_step;
         if (seconds() > end) return HUNG;
         if (look && look()) return INTERRUPTED;
         if (look && *asked) {
@@ -147,7 +151,7 @@ static int ask(struct client *client, int32_t kind) {
 static int exchange(struct client *client, int what) {
     client->box->what = what | (client->n_set ? SET : 0);
     client->box->n_set = client->n_set, client->box->n_get = client->n_get;
-    const int status = ask(client, EXCHANGE);
+    const int status = ask(client, EXCHANGE, 0);
     client->n_set = 0;
     client->fresh = status <= 1 && (what & GET);
     return status;
@@ -157,7 +161,7 @@ EXPORT int mailbox_talk(struct client *client) {
     int status = OK;
     if (client->n_set && (status = exchange(client, 0)) > 1) return status;
     client->fresh = 0;
-    return ask(client, TALK);
+    return ask(client, TALK, 0);
 }
 
 EXPORT int client_set_real(struct client *client, const unsigned *references, size_t n, const double *values) {
@@ -194,6 +198,65 @@ EXPORT int client_do_step(struct client *client, double time, double step, int n
     return exchange(client, STEP | GET);
 }
 
+/* The number of rows before the first one with a value that is not finite, whose reference is kept. */
+static int64_t finite_rows(struct client *client, const double *values, int64_t n_rows, int64_t n_out) {
+    for (int64_t k = 0; k < n_rows * n_out; ++k)
+        if (!isfinite(values[k])) {
+            client->bad_reference = client->get_references[k % n_out];
+            return k / n_out;
+        }
+    return n_rows;
+}
+
+/* Rows of inputs and of late ones in, rows of outputs back, as many as the room holds; *done of them are read. */
+static int ask_for_steps(struct client *client, const struct steps *some, int64_t *done) {
+    struct mailbox *box = client->box;
+    const int64_t n_rows = some->count * some->n_in;
+    double *late = box->room + n_rows, *out = late + (some->late ? n_rows : 0);
+    memcpy(box->room, some->inputs, (size_t)n_rows * sizeof *late);
+    if (some->late) memcpy(late, some->late, (size_t)n_rows * sizeof *late);
+    box->instance = 0, box->n_network = 0, box->n_in = some->n_in, box->n_out = some->n_out;
+    box->n_steps = box->n_rows = some->count, box->n_late = some->late ? some->count : 0;
+    box->time = (double)some->index * some->step_size, box->step = some->step_size;
+    box->done = 0, box->stage = SET;
+    const int status = ask(client, RUN, some->count);
+    const int64_t said = status <= 1 ? some->count : *(const volatile int64_t *)&box->done;
+    const int64_t read = said < 0 || said > some->count ? 0 : said;
+    memcpy(some->outputs, out, (size_t)(read * some->n_out) * sizeof *out);
+    *done = finite_rows(client, some->outputs, read, some->n_out);
+    return *done < read ? NOT_A_NUMBER : status;
+}
+
+/* Many steps, of which each costs no exchange. failed[0]: steps that were made; failed[1]: the call that failed. */
+EXPORT int client_many_steps(struct client *client, const struct steps *asked, int64_t *failed) {
+    struct mailbox *box = client->box;
+    struct steps some = *asked;
+    int status = OK;
+    failed[0] = 0, failed[1] = CALLED_SET;
+    if (some.n_in > MOST || some.n_out > MOST) return REFUSED;
+    if (client->n_set && (status = exchange(client, 0)) > 1) return status;
+    client->fresh = 0, client->n_get = some.n_out;
+    memcpy(client->get_references, some.output_references, (size_t)some.n_out * sizeof(unsigned));
+    memcpy(box->get_references, some.output_references, (size_t)some.n_out * sizeof(unsigned));
+    memcpy(box->set_references, some.input_references, (size_t)some.n_in * sizeof(unsigned));
+    const int64_t width = (some.late ? 2 : 1) * some.n_in + some.n_out, most = width ? ROOM / width : asked->count;
+    while (failed[0] < asked->count) {
+        const int64_t left = asked->count - failed[0];
+        int64_t done;
+        some.count = left < most ? left : most;
+        status = ask_for_steps(client, &some, &done);
+        failed[0] += done;
+        if (status > 1) {
+            const int64_t stage = *(const volatile int64_t *)&box->stage;
+            failed[1] = status == NOT_A_NUMBER || stage == GET ? CALLED_GET : stage == SET ? CALLED_SET : CALLED_STEP;
+            return status;
+        }
+        some.index += done, some.inputs += done * some.n_in, some.outputs += done * some.n_out;
+        if (some.late) some.late += done * some.n_in;
+    }
+    return status;
+}
+
 static int serve(struct mailbox *box, void *component, get_set set_real, get_set get_real, do_step step) {
     int worst = OK, status;
     if ((box->what & SET) && (status = set_real(component, box->set_references, (size_t)box->n_set, box->set_values)) > worst)
@@ -208,18 +271,6 @@ static int serve(struct mailbox *box, void *component, get_set set_real, get_set
         (status = get_real(component, box->get_references, (size_t)box->n_get, box->got)) > worst)
         worst = status;
     return worst;
-}
-
-/* Answer exchanges until something comes that C cannot answer: 1 for talk, 0 if the client is gone. */
-EXPORT int mailbox_serve(struct mailbox *box, int64_t parent, void *component, get_set set_real, get_set get_real,
-                         do_step step) {
-    for (;;) {
-        while (!changed(&box->request, box->reply, &box->sleeping[0]))
-            if (is_orphan(parent)) return 0;
-        if (box->kind != EXCHANGE) return 1;
-        box->status = serve(box, component, set_real, get_real, step);
-        publish(&box->reply, box->request, &box->sleeping[1]);
-    }
 }
 
 /* One instance of several that a process serves; none where its component is NULL. */
@@ -239,7 +290,7 @@ struct network {
 
 static struct network network_in(struct mailbox *box) {
     const int64_t n = box->n_network, length = box->n_steps > 1 ? box->n_steps : 1;
-    double *x = box->room + box->n_rows * box->n_in + length * box->n_out;
+    double *x = box->room + (box->n_rows + box->n_late) * box->n_in + length * box->n_out;
     return (struct network){n, box->n_in, box->n_out, x, x + n, x + n + n * n, x + n + n * n + n * box->n_out};
 }
 
@@ -263,7 +314,7 @@ static void move_on(const struct network *net, const double *out) {
 }
 
 static int run(struct mailbox *box, const struct served *served) {
-    double *in = box->room, *out = in + box->n_rows * box->n_in;
+    double *in = box->room, *late = in + box->n_rows * box->n_in, *out = late + box->n_late * box->n_in;
     int worst = OK, status;
     const struct network net = network_in(box);
     if (net.n < 0 || net.n > NETWORK || (net.n && (box->n_rows != 1 || net.n_in > MOST))) return REFUSED;
@@ -285,6 +336,11 @@ static int run(struct mailbox *box, const struct served *served) {
             if ((status = served->step(served->component, time, box->step, 1)) > worst)
                 if ((worst = status) > 1) return worst;
         }
+        if (k < box->n_late) {
+            box->stage = SET;
+            if ((status = served->set_real(served->component, box->set_references, (size_t)box->n_in, late + k * box->n_in)) > worst)
+                if ((worst = status) > 1) return worst;
+        }
         box->stage = GET;
         if (box->n_out &&
             (status = served->get_real(served->component, box->get_references, (size_t)box->n_out, out + k * box->n_out)) > worst)
@@ -292,6 +348,19 @@ static int run(struct mailbox *box, const struct served *served) {
         if (net.n) move_on(&net, out + k * box->n_out);
         box->done = k + 1;
         if (k + 1 >= box->n_steps) return worst;
+    }
+}
+
+/* Answer exchanges and runs until something comes that C cannot answer: 1 for talk, 0 if the client is gone. */
+EXPORT int mailbox_serve(struct mailbox *box, int64_t parent, void *component, get_set set_real, get_set get_real,
+                         do_step step) {
+    const struct served served = {component, set_real, get_real, step};
+    for (;;) {
+        while (!changed(&box->request, box->reply, &box->sleeping[0]))
+            if (is_orphan(parent)) return 0;
+        if (!component || (box->kind != EXCHANGE && box->kind != RUN)) return 1;
+        box->status = box->kind == RUN ? run(box, &served) : serve(box, component, set_real, get_real, step);
+        publish(&box->reply, box->request, &box->sleeping[1]);
     }
 }
 

@@ -75,6 +75,7 @@ class MailboxRun(ctypes.Structure):
         ("n_in", ctypes.c_int64),
         ("n_out", ctypes.c_int64),
         ("n_network", ctypes.c_int64),
+        ("n_late", ctypes.c_int64),
         ("done", ctypes.c_int64),
         ("stage", ctypes.c_int64),
     )

@@ -1,8 +1,10 @@
 /* FMI 2.0 functions that speak the port of this project to the outside, and a foreign FMU's own variables to the inside.
    `bound.py` describes the same structures to Python. A component without a binding never comes here. */
 #include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
-#include "fmi.h"
+#include "many_steps.h"
 
 enum { RECTANGULAR, POLAR, ABC, POWER };
 enum { V_RE, V_IM, I_RE, I_IM, P, Q, FIRST_OTHER };
@@ -28,6 +30,7 @@ struct adapter {
     void *component;
     get_set set_real, get_real;
     do_step step;
+    many_steps steps; /* NULL where each step is a call */
     const struct other *others;
     int64_t n_others;
     struct port voltage, current;
@@ -147,5 +150,102 @@ EXPORT int adapter_do_step(struct adapter *a, double time, double step, int no_s
         const int sent = send_voltage(a, a->time);
         if (sent > status) status = sent;
     }
+    return status;
+}
+
+/* Many steps: what each would set is written down first, then the FMU makes them all, then what it gave is converted. */
+struct tape {
+    double *row; /* where the voltage that is set now goes */
+    double *late;
+    const double *read;
+    size_t n;
+};
+
+static int note_voltage(void *tape, const unsigned *references, size_t n, double *values) {
+    memcpy(((struct tape *)tape)->row, values, n * sizeof *values);
+    return 0;
+}
+
+static int note_step(void *noted, double time, double step, int no_set_state) {
+    struct tape *tape = noted;
+    memcpy(tape->late, tape->row, tape->n * sizeof *tape->late);
+    tape->row = tape->late;
+    return 0;
+}
+
+static int give_current(void *tape, const unsigned *references, size_t n, double *values) {
+    memcpy(values, ((struct tape *)tape)->read, n * sizeof *values);
+    return 0;
+}
+
+struct moment { double v[2], time, angle; };
+
+static struct moment moment_of(const struct adapter *a) { return (struct moment){{a->v[0], a->v[1]}, a->time, a->angle}; }
+
+static void go_to(struct adapter *a, struct moment moment) {
+    a->v[0] = moment.v[0], a->v[1] = moment.v[1], a->time = moment.time, a->angle = moment.angle;
+}
+
+static size_t variables_of(const struct port *port) { return port->form == ABC ? 3 : 2; }
+
+/* Whether only the voltage is set, and nothing read but the port. */
+static int is_of_port(const struct steps *asked) {
+    int fits = 1;
+    for (int64_t k = 0; k < asked->n_in; ++k) fits = fits && asked->input_references[k] <= V_IM;
+    for (int64_t k = 0; k < asked->n_out; ++k) fits = fits && asked->output_references[k] < FIRST_OTHER;
+    return fits && asked->n_in > 0;
+}
+
+/* The same adapter before a tape instead of the FMU. */
+static struct adapter before_tape(const struct adapter *a, struct tape *tape) {
+    struct adapter noting = *a;
+    noting.component = tape, noting.set_real = note_voltage, noting.get_real = give_current, noting.step = note_step;
+    return noting;
+}
+
+static void note_steps(struct adapter *a, struct tape *tape, const struct steps *asked, double *in, struct moment *after) {
+    const size_t n_in = (size_t)asked->n_in;
+    double *late = tape->late;
+    for (int64_t k = 0; k < asked->count; ++k) {
+        tape->row = in + k * (int64_t)tape->n, tape->late = late + k * (int64_t)tape->n;
+        adapter_set_real(a, asked->input_references, n_in, asked->inputs + k * asked->n_in);
+        adapter_do_step(a, (double)(asked->index + k) * asked->step_size, asked->step_size, 1);
+        if (asked->late) adapter_set_real(a, asked->input_references, n_in, asked->late + k * asked->n_in);
+        after[k] = moment_of(a);
+    }
+}
+
+static int make_steps(struct adapter *a, const struct steps *asked, int64_t *failed, double *room, struct moment *after) {
+    const size_t n_in = variables_of(&a->voltage), n_out = variables_of(&a->current);
+    double *late = room + asked->count * (int64_t)n_in, *out = late + asked->count * (int64_t)n_in;
+    struct tape tape = {.row = room, .late = late, .n = n_in};
+    struct adapter noting = before_tape(a, &tape);
+    note_steps(&noting, &tape, asked, room, after);
+    const struct steps own = {a->voltage.references, a->current.references, (int64_t)n_in, (int64_t)n_out, room,
+                              asked->late || a->voltage.form == ABC ? late : NULL, out, asked->index, asked->count,
+                              asked->step_size};
+    const int status = a->steps(a->component, &own, failed);
+    const int64_t made = status > 1 ? failed[0] : asked->count;
+    for (int64_t k = 0; k < made; ++k) {
+        tape.read = out + k * (int64_t)n_out;
+        go_to(&noting, after[k]);
+        adapter_get_real(&noting, asked->output_references, (size_t)asked->n_out, asked->outputs + k * asked->n_out);
+    }
+    if (made) go_to(a, after[made - 1]);
+    return status;
+}
+
+/* 1 if these steps can be made at once. */
+EXPORT int adapter_takes_many(const struct adapter *a, const struct steps *asked) { return a->steps && is_of_port(asked); }
+
+EXPORT int adapter_many_steps(struct adapter *a, const struct steps *asked, int64_t *failed) {
+    enum { NO_MEMORY = 3 };
+    const size_t count = (size_t)asked->count, width = 2 * variables_of(&a->voltage) + variables_of(&a->current);
+    double *room = malloc((count * width + 1) * sizeof *room);
+    struct moment *after = malloc((count + 1) * sizeof *after);
+    failed[0] = 0, failed[1] = CALLED_SET;
+    const int status = room && after ? make_steps(a, asked, failed, room, after) : NO_MEMORY;
+    free(room);
+    free(after);
     return status;
 }

@@ -20,6 +20,7 @@ from orchestrator.devices.fmi.component import Component, RealBatch
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.instance import open_component
 from orchestrator.devices.fmi.interrupts import calls
+from orchestrator.devices.fmi.many_steps import StepRows
 from orchestrator.linear.models.sampled import steps_of_times, times_of
 
 _SOURCE = Path(__file__).with_name("drive.c")
@@ -224,30 +225,17 @@ def _drive_stretch(
     index: int,
 ) -> None:
     inputs, late, outputs = rows
-    into, out = (
-        RealBatch(component, names[0], inputs[0]),
-        RealBatch(component, names[1], outputs[0]),
-    )
+    asked = StepRows(component, names, inputs, outputs, late)
+    steps = asked.at(index, step_size)
     failed = (ctypes.c_int64 * 2)()
+    at = ctypes.addressof(steps), ctypes.addressof(failed)
     with calls:
-        status = _library().drive(
-            component.pointer,
-            *(
-                ctypes.cast(f, ctypes.c_void_p)
-                for f in (component.set_real, component.get_real, component.do_step)
-            ),
-            into.arguments[1],
-            len(names[0]),
-            out.arguments[1],
-            len(names[1]),
-            inputs.ctypes.data,
-            None if late is None else late.ctypes.data,
-            outputs.ctypes.data,
-            index,
-            len(inputs),
-            step_size,
-            failed,
-        )
+        if component.takes_many(steps):
+            status = component.many_steps(component.pointer, *at)
+        else:
+            each = (component.set_real, component.get_real, component.do_step)
+            functions = [ctypes.cast(one, ctypes.c_void_p) for one in each]
+            status = _library().drive(component.pointer, *functions, *at)
     if status:
         component.check(status, _CALLS[failed[1]], (index + failed[0]) * step_size)
     if not np.isfinite(outputs).all():
@@ -263,22 +251,5 @@ def _library() -> Any:
         library = ctypes.PyDLL(str(compile_here(_SOURCE)))
     except (OSError, RuntimeError) as error:
         raise InputError(f"the test bench is compiled, and {error}") from error
-    address, integer = ctypes.c_void_p, ctypes.c_int64
-    library.drive.argtypes = [
-        address,
-        address,
-        address,
-        address,
-        address,
-        integer,
-        address,
-        integer,
-        address,
-        address,
-        address,
-        integer,
-        integer,
-        ctypes.c_double,
-        address,
-    ]
+    library.drive.argtypes = [ctypes.c_void_p] * 6
     return library

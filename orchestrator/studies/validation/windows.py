@@ -17,6 +17,7 @@ _LEAST = 0.002  # smallest change of the voltage [pu] over that time which is an
 _ABOVE = 4.0  # times the largest change in the first part, from which on it is an event
 _FIRST = 0.1  # part of the recording that is looked at for what is usual before the event
 _LONGEST_FIRST = 1.0  # [s]
+_SHORTEST_FIRST = 0.2  # time [s] before an event within the first part that shows a steady state
 _BACK = 0.5  # time [s] for which an event's slow begin is looked for before it is abrupt
 _STARTS = 5.0  # times the scatter before, from which on a deviation is the event's begin
 _LEAST_STARTS = 5e-4  # smallest such deviation [pu]
@@ -55,10 +56,17 @@ class Windows:
 
 
 def find_windows(recording: Recording) -> Windows:
-    """By the first abrupt change of the voltage, or of the power where the voltage has none."""
+    """By the first abrupt change of the voltage, or of the power where the voltage has none.
+
+    If none stands out from the first part, the event may lie within it."""
     first = _first(recording)
     for still in (_without_slope(recording.voltage, first), recording.power):
         found = _event(recording, still, first)
+        if found is not None:
+            return Windows(*found, recording.length)
+    shortest = max(5, round(_SHORTEST_FIRST / recording.interval))
+    for still in (_without_slope(recording.voltage, shortest), recording.power):
+        found = _early_event(recording, still, shortest, first)
         if found is not None:
             return Windows(*found, recording.length)
     third = recording.length / 3
@@ -83,9 +91,12 @@ def _first(recording: Recording) -> int:
     return max(5, round(min(_LONGEST_FIRST, _FIRST * recording.length) / recording.interval))
 
 
+def _lag(recording: Recording) -> int:
+    return max(1, round(_LAG / recording.interval))
+
+
 def _event(recording: Recording, still: Complex, first: int) -> tuple[float, float] | None:
-    interval = recording.interval
-    lag = max(1, round(_LAG / interval))
+    lag = _lag(recording)
     if len(still) < first + 2 * lag:
         return None
     change = np.abs(still[lag:] - still[:-lag])
@@ -93,8 +104,36 @@ def _event(recording: Recording, still: Complex, first: int) -> tuple[float, flo
     abrupt = np.flatnonzero(change > max(_ABOVE * usual, _LEAST))
     if not len(abrupt):
         return None
-    earliest = max(0, int(abrupt[0]) + lag - round(_BACK / interval))
-    stop = int(abrupt[0]) + lag
+    earliest = max(0, int(abrupt[0]) + lag - round(_BACK / recording.interval))
+    return _begin_and_end(recording, still, earliest, int(abrupt[0]) + lag)
+
+
+def _early_event(
+    recording: Recording, still: Complex, shortest: int, first: int
+) -> tuple[float, float] | None:
+    """An event after at least ``shortest`` and at most ``first`` samples.
+
+    Its change is beyond all that ended by a lag before it began: a swing or ramp grows too slowly for that."""
+    lag = _lag(recording)
+    if len(still) < first + 2 * lag:
+        return None
+    change = np.abs(still[lag : first + 2 * lag] - still[: first + lag])
+    before = np.maximum.accumulate(change)[: -2 * lag]
+    late = change[2 * lag :]
+    abrupt = np.flatnonzero(late > np.maximum(_ABOVE * before, _LEAST))
+    begins = abrupt[abrupt + 2 * lag >= shortest]
+    if not len(begins):
+        return None
+    steady = int(begins[0]) + lag  # samples that took part in the changes before
+    return _begin_and_end(recording, still, steady, steady + 2 * lag)
+
+
+def _begin_and_end(
+    recording: Recording, still: Complex, earliest: int, stop: int
+) -> tuple[float, float]:
+    """Begin between two samples, and the end [s]."""
+    lag, interval = _lag(recording), recording.interval
+    change = np.abs(still[lag:] - still[:-lag])
     begin = _begin(still, earliest, stop)
     end = _end(still, begin, change, lag, interval)
     return interval * begin, interval * min(end, len(still) - 2)

@@ -1,0 +1,72 @@
+"""An event within the first tenth of a recording is found if the time before it is steady and long enough."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from orchestrator.studies.validation.record import PortBases, read_recording
+from orchestrator.studies.validation.windows import find_windows
+
+LENGTH = 6.0  # [s]
+
+
+def windows(voltage, interval=1e-3, power=60.0, noise=2e-5):
+    """Of a recording whose complex voltage [pu] is a function of time [s]."""
+    times = np.arange(0.0, LENGTH, interval)
+    random = np.random.default_rng(1)
+    v = voltage(times) * (1 + noise * random.standard_normal(len(times)))
+    columns = {
+        "v_pu": np.abs(v),
+        "angle_deg": np.rad2deg(np.unwrap(np.angle(v))),
+        "p_mw": power + 0 * times,
+        "q_mvar": 0.0,
+    }
+    frame = pd.DataFrame(columns, pd.Index(times.round(6), name="time"))
+    return find_windows(read_recording(frame.to_xarray(), "made", PortBases(100.0, 50.0)))
+
+
+def dip(at, hertz=0.0):
+    def voltage(times):
+        deep = (times >= at - 1e-9) & (times < at + 0.2)
+        return (1 - 0.3 * deep) * np.exp(2j * np.pi * hertz * times)
+
+    return voltage
+
+
+@pytest.mark.parametrize("hertz", [0.0, 0.08])
+@pytest.mark.parametrize("interval", [1e-3, 0.02])
+@pytest.mark.parametrize("at", [0.3, 0.4, 0.5, 0.58])
+def test_a_dip_there_is_found_with_its_begin_and_end(at, interval, hertz):
+    found = windows(dip(at, hertz), interval)
+    assert found.seen
+    assert found.begin == pytest.approx(at, abs=1.1 * interval)
+    assert found.end == pytest.approx(at + 0.2, abs=1.1 * interval)
+
+
+def test_a_step_of_the_power_alone_is_found_as_well():
+    def stepped(times):
+        return np.ones(len(times), complex)
+
+    times = np.arange(0.0, LENGTH, 1e-3)
+    found = windows(stepped, power=60.0 + 5.0 * (times >= 0.5 - 1e-9))
+    assert found.seen
+    assert found.begin == pytest.approx(0.5, abs=0.025)  # powers are means over a period
+
+
+def test_an_event_without_a_steady_time_before_it_is_none():
+    assert not windows(dip(0.1)).seen
+
+
+@pytest.mark.parametrize("hertz", [0.1, 0.2, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize("phase", [0.0, 0.8, 1.5708, 2.4])
+def test_a_swing_has_no_early_event_wherever_it_begins(hertz, phase):
+    def swing(times):
+        wave = np.sin(2 * np.pi * hertz * times + phase)
+        return (1 + 0.03 * wave) * np.exp(0.2j * wave)
+
+    found = windows(swing)
+    assert not found.seen or found.begin > 0.1 * LENGTH - 0.05
+
+
+def test_noise_alone_has_no_event():
+    assert not windows(lambda times: np.ones(len(times), complex), noise=3e-3).seen
