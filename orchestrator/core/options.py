@@ -53,6 +53,7 @@ class Option(Spelling, Enum):
     DYR_LEAVE_OUT = "dyr-leave-out", ALONE
     ENGINE_HELICS = "engine helics", "federates"
     EVENT = "event", "events"
+    EXPLAIN = "explain"
     EXTERNAL = "external", ALONE
     FAULT = "fault"
     FEDERATE = "federate", "federates"

@@ -24,6 +24,7 @@ from orchestrator.studies.validation.figures import (
 )
 from orchestrator.studies.validation.filled import Mask, runs_of
 from orchestrator.studies.validation.other_event import ask_of_other_event
+from orchestrator.studies.validation.out_of_step import step_loss
 from orchestrator.studies.validation.parameters import NEVER
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.record import PortBases, Recording, questions_of_level
@@ -347,9 +348,30 @@ def _of_response(comparison: EventComparison) -> list[Question]:
     found += _assumed_bases(comparison.device)
     found += _slow_samples(comparison)
     found += _without_noise(comparison)
-    of_other = ask_of_other_event(event.recording, played.power)
+    of_other = ask_of_other_event(event.recording, played.power) or _of_step(comparison)
     found += of_other or ask_of_setpoint(event.recording, event.windows, played.power)
     return found
+
+
+def _of_step(comparison: EventComparison) -> list[Question]:
+    """A model that falls out of step where the plant did not."""
+    event = comparison.event
+    recording = event.recording
+    loss = step_loss(recording, event.windows, comparison.played.power)
+    if loss is None:
+        return []
+    figures = {"at": recording.begin + loss.time, "own": loss.own, "seen": loss.seen}
+    return [Question(QuestionKind.OUT_OF_STEP, figures)]
+
+
+def in_step(comparison: EventComparison) -> EventComparison:
+    """The comparison up to where the model falls out of step; the same where it does not."""
+    event = comparison.event
+    for one in comparison.questions:
+        if one.kind is QuestionKind.OUT_OF_STEP:
+            at = float(one.figures["at"]) - event.recording.begin
+            return compare_with(comparison.device, cut_event(event, at - event.windows.begin))
+    return comparison
 
 
 def _assumed_bases(device: PlayedDevice) -> list[Question]:

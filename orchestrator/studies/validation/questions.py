@@ -37,6 +37,7 @@ class QuestionKind(StrEnum):
     CLOCKS = "clocks"
     METER_ELSEWHERE = "meter elsewhere"
     SETPOINT = "setpoint"
+    OUT_OF_STEP = "out of step"
     OTHER_EVENT = "another event"
     TOO_GOOD = "too good"
     NO_NOISE = "no noise"

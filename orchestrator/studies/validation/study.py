@@ -20,6 +20,7 @@ from orchestrator.studies.validation.event import (
     EventComparison,
     RecordedEvent,
     compare_with,
+    in_step,
     prepare_event,
     rms_error,
 )
@@ -172,12 +173,12 @@ def _validate(request: ValidationRequest, report: Report) -> ValidationResult:
     for event in events_of(request):
         report(f"{event.recording.label}: driving {request.device.name}")
         comparison = _compare(request.device, event, request.bases)
-        asked = question_readings(comparison, request.bases)
+        asked = question_readings(in_step(comparison), request.bases)
         comparisons.append(replace(comparison, questions=comparison.questions + tuple(asked)))
     others = _others(request, [one.event for one in comparisons], report)
     result = add_verdict(ValidationResult(request, comparisons, others=others))
     if request.explain:
-        events = [one.event for one in result.comparisons]
+        events = [in_step(one).event for one in result.comparisons]
         search = explain_errors(request.device, events, report)
         result = replace(result, explanations=search.causes, interrupted=not search.finished)
     return _with_fit(result, report) if request.fit and not result.interrupted else result

@@ -278,6 +278,17 @@ def _setpoint(x: Figures) -> str:
     )
 
 
+def _out_of_step(x: Figures) -> str:
+    return (
+        f"from {x['at']:.4g} s on the model falls out of step (its P is {x['own']:.3g} pu in the mean of the end, the "
+        f"plant's {x['seen']:.3g} pu), and a recorded voltage does not bring it back: near its limit of the current "
+        "little makes it fall, and what comes after tells no value. "
+        + Option.EXPLAIN
+        + " looks at the part before; "
+        "give it to " + Option.FIT + " as well, with " + Option.STOP + f" {x['at']:.4g}"
+    )
+
+
 def _other_event(x: Figures) -> str:
     moves = f"P and Q move by {x['moves']:.3g} pu and more at {x['at']:.4g} s"
     if "voltage_at" in x:
@@ -351,6 +362,7 @@ _SENTENCES: Mapping[QuestionKind, Callable[[Figures], str]] = {
     QuestionKind.CLOCKS: _clocks,
     QuestionKind.METER_ELSEWHERE: _meter_elsewhere,
     QuestionKind.SETPOINT: _setpoint,
+    QuestionKind.OUT_OF_STEP: _out_of_step,
     QuestionKind.OTHER_EVENT: _other_event,
     QuestionKind.TOO_GOOD: _too_good,
     QuestionKind.NOISE: _noise,
