@@ -565,7 +565,7 @@ def _cause(one: Explanation) -> str:
 def refused_sentence(refused: Sequence[RefusedTrial]) -> str:
     """Name what was tried and did not run."""
     names = "; ".join(one.tried for one in refused)
-    return f"Tried, and the device did not run so: {names}. --json and the page say why."
+    return f"Tried, and the device did not run so: {names}. JSON and the page say why."
 
 
 def fit_sentence(fit: Fit, kept_back: Sequence[str]) -> str:
