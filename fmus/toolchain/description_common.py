@@ -5,7 +5,6 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element, SubElement
-from xml.sax.saxutils import escape
 
 from fmus.toolchain.dependencies import Unknown, structure, unlisted
 from fmus.toolchain.model import Model
@@ -34,6 +33,9 @@ _IN_ATTRIBUTES = str.maketrans(
     }
 )
 """Characters that an attribute of XML has in another form."""
+
+_IN_TEXT = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;"})
+"""The same in an element's text. It is what xml.sax.saxutils does, which imports clients of HTTP and of TLS."""
 
 _CALCULATED = {"causality": "local", "variability": "continuous", "initial": "calculated"}
 
@@ -138,7 +140,7 @@ def _write(element: Element, margin: str, lines: list[str]) -> None:
         [f' {name}="{value.translate(_IN_ATTRIBUTES)}"' for name, value in element.items()]
     )
     if not len(element):
-        end = f">{escape(element.text)}</{element.tag}>" if element.text else " />"
+        end = f">{element.text.translate(_IN_TEXT)}</{element.tag}>" if element.text else " />"
         lines.append(f"{margin}<{element.tag}{attributes}{end}")
         return
     lines.append(f"{margin}<{element.tag}{attributes}>")
