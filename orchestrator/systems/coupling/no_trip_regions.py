@@ -40,7 +40,7 @@ class NoTripRegion:
     limits: Mapping[Quantity, tuple[RelayLimits, ...]]
 
 
-def _prc029(low: tuple[tuple[float, float], ...]) -> NoTripRegion:
+def _prc029(title: str, low: tuple[tuple[float, float], ...]) -> NoTripRegion:
     voltages = [RelayLimits(below, inf, lasts, 0.0, _VOLTAGE_WINDOW) for below, lasts in low]
     for above, lasts in PRC029_HIGH:
         window = _LONG_WINDOW if lasts > _LONG else _VOLTAGE_WINDOW
@@ -53,10 +53,10 @@ def _prc029(low: tuple[tuple[float, float], ...]) -> NoTripRegion:
         "voltage": tuple(voltages),
         "frequency": tuple(frequencies),
     }
-    return NoTripRegion("PRC-029", PRC029_RATED, limits)
+    return NoTripRegion(title, PRC029_RATED, limits)
 
 
 NO_TRIP_REGIONS: Mapping[NoTripCode, tuple[NoTripRegion, NoTripRegion]] = {
-    "prc029": (_prc029(PRC029_LOW), _prc029(PRC029_LOW_WIND))
+    "prc029": (_prc029("PRC-029", PRC029_LOW), _prc029("PRC-029 for wind", PRC029_LOW_WIND))
 }
 """Code → its region for plants other than wind, and for wind."""

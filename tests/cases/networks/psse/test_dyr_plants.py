@@ -257,14 +257,17 @@ def test_a_turbine_of_one_mass_needs_no_frequency_and_its_slope_is_asked_about(p
 
 
 @pytest.mark.parametrize(
-    ("records", "shortest"),
-    [("REGCB1 REECC1", 0.32), ("REGCA1 REECA1 WTDTA1 WTARA1 WTPTA1 WTTQA1", 0.16)],
+    ("records", "shortest", "told"),
+    [
+        ("REGCB1 REECC1", 0.32, "PRC-029"),
+        ("REGCA1 REECA1 WTDTA1 WTARA1 WTPTA1 WTTQA1", 0.16, "PRC-029 for wind"),
+    ],
 )
-def test_a_code_gives_a_wind_plant_the_times_of_wind(records, shortest, prepared, tmp_path):
-    """PRC-029 has a table of its own for wind: below 0.25 pu half of the time."""
+def test_a_code_gives_a_wind_plant_the_times_of_wind(records, shortest, told, prepared, tmp_path):
+    """PRC-029 has a table of its own for wind, and a trip names it: below 0.25 pu half of the time."""
     prepared(with_records(*MADE[records]), "")
     (ready,) = with_protection(load_case(tmp_path / "case.toml"), "prc029").prepare()
-    assert {relay.of for relay in ready.relays} == {"gfor3"}
+    assert {(relay.of, relay.record) for relay in ready.relays} == {("gfor3", told)}
     assert min(x.limits.delay for x in ready.relays if x.limits.low == 0.25) == shortest
 
 
