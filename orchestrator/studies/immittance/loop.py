@@ -5,7 +5,6 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from orchestrator.core.arrays import Complex, Numbers, Vector
 from orchestrator.studies.immittance.sides import ON_AXIS, Known, Side, Together, Unit
@@ -241,6 +240,8 @@ def followed(eigenvalues: Vector) -> Complex:
             if crossed < straight:
                 found[k] = now[::-1]
         else:
+            from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - half a second to import
+
             far = np.abs(before[:, None] - now[None, :])
             found[k] = now[linear_sum_assignment(far)[1]]
     return found
