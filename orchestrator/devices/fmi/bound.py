@@ -70,11 +70,7 @@ class BoundComponent(Derived):
     def __init__(self, inner: Component, description: BoundDescription) -> None:
         self.name, self.description, self.inner = inner.name, description, inner
         self._port, self._inner_names = description.port, description.inner_names
-        self._start: dict[str, float] = {
-            name: description.variables[name].start_number
-            for name in START
-            if name in description.variables
-        }
+        self._start = self._delivered_start()
         self._start_is_new = True
         self._adapter = _Adapter()
         self._fill()
@@ -285,6 +281,23 @@ class BoundComponent(Derived):
     def reset(self) -> None:
         """Back to where it was after instantiation; the start values are sent again."""
         self.inner.reset()
+        self._begin_again()
+
+    @property
+    def renewable(self) -> bool:
+        return self.inner.renewable
+
+    def renew(self) -> None:
+        self.inner.renew()
+        self._start = self._delivered_start()
+        self._scale()
+        self._begin_again()
+
+    def _delivered_start(self) -> dict[str, float]:
+        variables = self.description.variables
+        return {name: variables[name].start_number for name in START if name in variables}
+
+    def _begin_again(self) -> None:
         self._adapter.v[:] = (1.0, 0.0)
         self._adapter.time = self._adapter.angle = 0.0
         self._start_is_new = True

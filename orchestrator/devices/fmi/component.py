@@ -67,6 +67,13 @@ class Component(Protocol):
     def reset(self) -> None:
         """Back to where it was after instantiation."""
 
+    @property
+    def renewable(self) -> bool:
+        """Return whether `renew` makes a new instance, as it does in a process of its own."""
+
+    def renew(self) -> None:
+        """Free the instance and its library, and make a new one in the same process."""
+
     def close(self) -> None:
         """Terminate and free the instance, and remove what was made for it."""
 
@@ -124,6 +131,13 @@ class Derived(Closing):
     @property
     def one_thread(self) -> str | None:
         return "in a process of its own"
+
+    @property
+    def renewable(self) -> bool:
+        return False
+
+    def renew(self: Component) -> None:
+        raise InputError(f"component {self.name!r} is opened anew instead of being renewed")
 
     def hold(self: Component, states: Sequence[str]) -> None:
         whole: FmuDescription = vars(self).setdefault("_with_all_states", self.description)

@@ -26,6 +26,8 @@ from orchestrator.devices.fmi.protection import Protection
 from orchestrator.devices.fmi.refusal import refusal
 from orchestrator.devices.fmi.remote_calls import Form, RemoteCalls
 
+_TO_END = 5.0  # time for an FMU to free its instance [s]
+
 
 class IsolatedComponent(RemoteCalls):
     def __init__(
@@ -159,14 +161,24 @@ class IsolatedComponent(RemoteCalls):
         )
         return self._typed(matrix, found, len(unknowns), len(knowns))
 
+    @property
+    def renewable(self) -> bool:
+        return not runs_under_wine(self.description)
+
+    def renew(self) -> None:
+        self._box.client.patience = min(self.limits.seconds, _TO_END)
+        self._remote("fmi2FreeInstance", "release")
+        self._box.client.patience = self.limits.seconds
+        self._remote("fmi2Instantiate", "instantiate")
+
     def close(self) -> None:
         process = self._process
         if process is not None and self._end is None and process.running:
-            self._box.client.patience = min(self._box.client.patience, 5.0)
+            self._box.client.patience = min(self._box.client.patience, _TO_END)
             # an FMU that failed may not end by itself
             with suppress(ComponentError, InputError, ValueError):
                 self._remote("fmi2Terminate", "close")
-                process.wait(5.0)
+                process.wait(_TO_END)
         self._end = self._end or "closed"
         if process is not None:
             process.close()

@@ -60,8 +60,7 @@ class Worker:
 
     def serve(self) -> None:
         box = self._box
-        pointers: tuple[Any, ...] = (None, None, None, None)
-        while box.library.mailbox_serve(box.address, self._parent, *pointers):
+        while box.library.mailbox_serve(box.address, self._parent, *self._pointers()):
             command, *arguments = box.read_text()
             if command == "close":
                 if self._component is not None:
@@ -71,14 +70,14 @@ class Worker:
                 # what an FMU registered for the end of the process is of no use to anyone
                 os._exit(0)
             self._answer(command, arguments)
-            component = self._component
-            if component is not None:
-                functions = (component.set_real, component.get_real, component.do_step)
-                pointers = (
-                    component.pointer,
-                    *(ctypes.cast(f, ctypes.c_void_p) for f in functions),
-                )
         os._exit(DIED)
+
+    def _pointers(self) -> tuple[Any, ...]:
+        component = self._component
+        if component is None:
+            return (None, None, None, None)
+        functions = (component.set_real, component.get_real, component.do_step)
+        return (component.pointer, *(ctypes.cast(f, ctypes.c_void_p) for f in functions))
 
     def _answer(self, command: str, arguments: list[Any]) -> None:
         function = (
@@ -122,6 +121,12 @@ class Worker:
             raise ComponentError(self._request["name"], "fmi2Instantiate", "no instance", said)
         directory = Path(self._request["directory"])
         self._component = LoadedComponent(self._request["name"], self._description, directory)
+
+    def do_release(self) -> None:
+        """Free the instance with its library and its saved states; the process goes on."""
+        component, self._component = self._instance(), None
+        self._states.clear()
+        component.close()
 
     def do_jacobian(self, unknowns: list[str], knowns: list[str]) -> Any:
         return self._instance().jacobian(unknowns, knowns).tolist()

@@ -18,7 +18,7 @@ from orchestrator.devices.fmi.devices import NO_BUS, PORT, is_controller_alone
 from orchestrator.devices.fmi.instance import is_ours
 from orchestrator.studies.black_box.bench import drive
 from orchestrator.studies.validation.averaging import averaged
-from orchestrator.studies.validation.instances import InstanceShelf
+from orchestrator.studies.validation.instances import InstanceRun, InstanceShelf
 from orchestrator.studies.validation.record import Recording
 from orchestrator.studies.validation.trials import TrialLog
 from orchestrator.systems.coupling.step_awareness import STEP_PARAMETER
@@ -32,6 +32,8 @@ _SHORT_STEP = 1e-4  # communication step [s] of a coupled run, whose held voltag
 _ROUGH_STEP = (
     5e-4  # communication step [s] for a first look: half the time of a run in steps of 100 us
 )
+_PROBE_STEPS = 200  # that move most states of a device
+_PROBE_JUMP = 0.95 + 0.05j  # of the voltage, in magnitude and angle
 _LONGEST_REST = 20.0  # time [s] after which it is driven, at rest or not
 
 
@@ -64,6 +66,11 @@ class Played:
     settled_after: float
     rest: complex
     still: bool  # whether it came to rest
+
+    def same_as(self, other: Played) -> bool:
+        """Return whether both are the same to the last bit."""
+        mine, others = ((one.settled_after, one.rest, one.still) for one in (self, other))
+        return mine == others and np.array_equal(self.power, other.power)
 
 
 @dataclass(frozen=True)
@@ -126,16 +133,42 @@ class PlayedDevice:
         steps would hold, and its end what the last of them would: that at its begin alone would be late by half of it
         in what a device integrates, and by all of it in what follows the voltage at once."""
         values = {**self._told_step(), **self._start_values(start), **self.values}
-        with self.shelf.instance(self.description, self.isolated) as component:
-            component.setup(0.0, None)
-            component.set(values)
-            component.enter_initialization_mode()
-            at = (start.voltage.real, start.voltage.imag)
-            component.set({**self.held, **dict(zip(_VOLTAGE, at, strict=True))})
-            component.exit_initialization_mode()
-            begin = RealBatch(component, _CURRENT).read().copy()
-            before = self._rest(component, at, begin)
-            driven = self._driven(component, recording, before)
+
+        def begun(component: Component) -> Component:
+            return self._begin(component, values, start)
+
+        run = InstanceRun(
+            self.description,
+            self.isolated,
+            values,
+            work=lambda component: self._run(begun(component), recording, start),
+            probe=lambda component: self._probe(begun(component), start),
+        )
+        return self.shelf.run(run)
+
+    def _begin(
+        self, component: Component, values: Mapping[str, float | bool], start: OperatingStart
+    ) -> Component:
+        """Initialise an instance at the operating point."""
+        component.setup(0.0, None)
+        component.set(values)
+        component.enter_initialization_mode()
+        at = (start.voltage.real, start.voltage.imag)
+        component.set({**self.held, **dict(zip(_VOLTAGE, at, strict=True))})
+        component.exit_initialization_mode()
+        return component
+
+    def _probe(self, component: Component, start: OperatingStart) -> Numbers:
+        """Currents after a jump of the voltage, in few steps."""
+        jumped = np.full(_PROBE_STEPS, start.voltage * _PROBE_JUMP)
+        return drive(component, _NAMES, _columns(jumped), self.step_size)
+
+    def _run(self, component: Component, recording: Recording, start: OperatingStart) -> Played:
+        """A run of an instance that stands at the operating point."""
+        at = (start.voltage.real, start.voltage.imag)
+        begin = RealBatch(component, _CURRENT).read().copy()
+        before = self._rest(component, at, begin)
+        driven = self._driven(component, recording, before)
         rest = start.voltage * complex(*before[-1]).conjugate() * SYSTEM_BASE_MVA / self.rating
         settled_after = (len(before) - 1) * self.step_size
         return Played(driven, settled_after, rest, still=settled_after < _LONGEST_REST)

@@ -8,10 +8,15 @@ import pandas as pd
 import pytest
 
 from orchestrator.cases.scenario.catalogue_fmus import catalogue_fmu
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.devices.fmi.isolation import IsolatedComponent
 from orchestrator.face.api import validation as face
 from orchestrator.studies.validation import instances
+from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import prepare_event
 from orchestrator.studies.validation.record import PortBases, read_recording
+from tests.devices.acceptance.gallery.build import build
+from tests.devices.acceptance.gallery.members import converter
 
 OTHERS = {
     "gfor": {"droop.R_f": 0.1, "pod_p.enabled": True, "current_limit.kind": 1},
@@ -58,3 +63,79 @@ def test_a_model_by_its_name_runs_without_python_and_gives_the_same_to_the_last_
     of_python = replace(device, description=catalogue_fmu("gfor"))
     powers = [one.play(seen.recording, seen.start).power for one in (device, of_python)]
     assert np.array_equal(*powers)
+
+
+LEAVES = (
+    '({ static int late = -1; if (late < 0) late = getenv("RAN") != 0;'
+    ' if (WHERE) setenv("RAN", "1", 1); late; })'
+)
+"""True in a process in which an instance ran before, with a droop as in WHERE: the library forgets, the process not."""
+
+
+def stranger(folder, **faults):
+    """A device of somebody else's FMU."""
+    source = converter("stranger", **faults)
+    description = read_description(build(source, folder))
+    return PlayedDevice("stranger", description, {"S_n": 100.0}, 100.0, 50.0)
+
+
+@pytest.fixture
+def processes(monkeypatch):
+    """The processes that are started for FMUs, one after another."""
+    opened = []
+    begin = IsolatedComponent._start
+
+    def counted(component, directory):
+        opened.append(component)
+        begin(component, directory)
+
+    monkeypatch.setattr(IsolatedComponent, "_start", counted)
+    return opened
+
+
+DROOPS = (0.02, 0.02, 0.05, 0.04, 0.02, 0.05)
+
+
+def powers(device, seen):
+    return [
+        device.with_values({"R_f": droop}).play(seen.recording, seen.start).power
+        for droop in DROOPS
+    ]
+
+
+def test_a_strangers_process_runs_many_times_after_two_runs_that_show_that_it_may(
+    tmp_path, processes
+):
+    device, seen = stranger(tmp_path), event()
+    each = powers(device, seen)
+    assert len(processes) == len(DROOPS)
+    processes.clear()
+    with device.shelf.keeping():
+        kept = powers(device, seen)
+    np.testing.assert_array_equal(kept, each)
+    assert np.abs(kept[2] - kept[0]).max() > 1e-5
+    assert len(processes) == 3  # one more beside a run with the same values, and with others
+    assert not any(one._process.running for one in processes)
+
+
+@pytest.mark.parametrize("where", ["1", "z[GAIN] > 0.03"])
+def test_what_a_run_leaves_in_a_process_never_reaches_the_next_run(where, tmp_path, processes):
+    faults = {"FAULT_GAIN_WHERE": LEAVES.replace("WHERE", where), "FAULT_GAIN_BY": 1.3}
+    device, seen = stranger(tmp_path, **faults), event()
+    each = powers(device, seen)
+    with device.shelf.keeping():
+        kept = powers(device, seen)
+    np.testing.assert_array_equal(kept, each)
+
+
+def test_a_run_that_fails_in_a_used_process_is_made_in_a_new_one(tmp_path, processes):
+    """A library that its second instance in a process crashes, as one that frees what it still needs."""
+    crashes = LEAVES.replace("WHERE", "1").replace(" late; })", " late && (abort(), 1); })")
+    assert "abort" in crashes
+    device, seen = stranger(tmp_path, FAULT_GAIN_WHERE=crashes, FAULT_GAIN_BY=1.3), event()
+    each = powers(device, seen)
+    processes.clear()
+    with device.shelf.keeping():
+        kept = powers(device, seen)
+    np.testing.assert_array_equal(kept, each)
+    assert len(processes) == len(DROOPS)
