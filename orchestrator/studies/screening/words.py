@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from orchestrator.core.options import Option, command
 from orchestrator.linear.spectra.critical_modes import DENSE
 from orchestrator.linear.spectra.shifted_equations import GROWING
 from orchestrator.linear.spectra.stability import zeros_in_words
@@ -226,7 +227,8 @@ def _outages_not_asked(summary: Summary) -> str:
     """Say that only the intact network was looked at, which else reads as if each outage were harmless."""
     if len(summary.result.plan.outages) > 1:
         return ""
-    return " No outage was asked for; --outages n-1 takes each line and each unit out."
+    typed = command("screen CASE", (Option.OUTAGES, "n-1"))
+    return f" No outage was asked for; {typed} takes each line and each unit out."
 
 
 def _what_was_linearised(summary: Summary) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import Literal
 
-from orchestrator.systems.coupling.relays import Quantity, RelayLimits
+from orchestrator.systems.coupling.relay_limits import Quantity, RelayLimits
 
 NoTripCode = Literal["prc029"]
 

@@ -7,7 +7,7 @@ happen when the breaker has opened. Nothing takes an order back."""
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import exp, inf, pi
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -15,8 +15,7 @@ from orchestrator.core.arrays import Numbers
 from orchestrator.devices.fmi.component import RealBatch
 from orchestrator.systems.coupling.events import Event, LoadChange, UnitSwitching
 from orchestrator.systems.coupling.observers import ObservedRun
-
-Quantity = Literal["voltage", "frequency"]
+from orchestrator.systems.coupling.relay_limits import Quantity, RelayLimits
 
 LOOK_EVERY = 1e-3
 """Time between two looks of the relays [s], a small part of the shortest delay that a relay of a planner's file has."""
@@ -44,20 +43,6 @@ class Shedding:
     component: str
     load: str
     share: float
-
-
-@dataclass(frozen=True, slots=True)
-class RelayLimits:
-    """Limits of a voltage [pu] or a frequency [Hz], −∞ and ∞ where there is none, and times [s].
-
-    ``delay``: time beyond a limit after which the relay trips; ``opening``: time of the breaker after that.
-    ``window``: the last seconds of which all that was beyond counts together; 0 where coming back forgets it."""
-
-    low: float
-    high: float
-    delay: float
-    opening: float
-    window: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -417,7 +417,7 @@ def test_a_matrix_is_named_by_a_letter():
         ({"folder": "/proc/x"}, "an FMU cannot be written there"),
         (
             {"platforms": ["amiga"]},
-            "there is no platform 'amiga'; choose from darwin64, linux64, win64",
+            "there is no platform 'amiga'; choose from darwin64, linux64, wasm32-wasip2, win64",
         ),
         ({"platforms": ["amiga"], "native": True}, "there is no platform 'amiga'"),
         ({"platforms": 3}, "platforms = 3; give a name"),

@@ -136,6 +136,8 @@ def quoted_commands():
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.Call) and ast.unparse(node.func) == "command":
                 words, *options = node.args
+                # options of a list are of `gfor new`, which Python does not have
+                options = [one for one in options if not isinstance(one, ast.Starred)]
                 given = [
                     (Option[one.elts[0].attr], "1")
                     if isinstance(one, ast.Tuple)

@@ -239,7 +239,13 @@ def test_what_runs_away_is_looked_for_from_the_start_on(events, begins, monkeypa
     def stop(seen, system, settings, parts, **_):
         raise PartsError([part.begin for part in parts])
 
-    for name in ("undisturbed_motion", "lost_synchronism", "above_declared", "active_limits"):
+    for name in (
+        "undisturbed_motion",
+        "lost_synchronism",
+        "above_declared",
+        "active_limits",
+        "own_trips",
+    ):
         monkeypatch.setattr(watch, name, lambda *_: ())
     monkeypatch.setattr(watch, "resting_signals", lambda *_: ())
     monkeypatch.setattr(

@@ -40,7 +40,7 @@ def test_the_findings_name_where_each_criterion_is_not_accepted(monkeypatch):
         0.5: (False, None),
     }
     verdicts = [
-        SimpleNamespace(X_L=X, judged=judged, time=time, eigenvalues_accepted=X < 0.3)
+        SimpleNamespace(X_L=X, is_judged=judged, time=time, eigenvalues_accepted=X < 0.3)
         for X, (judged, time) in times.items()
     ]
     c = SimpleNamespace(

@@ -115,7 +115,7 @@ def test_a_whole_run_decides_about_modes_near_zero_and_not_of_others_that_grow(
     )
     prepared = bare_scenario(events=(SimpleNamespace(time=0.5),), stop_time=stop)
     modes = SimpleNamespace(prepared=prepared, modes=before.modes, model=before.model)
-    found = answer_of_run.of_run(SimpleNamespace(after=after, modes=modes, trips=()))
+    found = answer_of_run.of_run(SimpleNamespace(after=after, modes=modes, trips=(), findings=()))
     assert found.good is good
     assert ("by a power flow, decides nothing" in found.remark) is (good and damping < 0.5)
 
@@ -128,7 +128,7 @@ def of_two_modes(case, monkeypatch, moved, other):
     after = replace(before, modes=left, stability=replace(before.stability, stable=True, mode=None))
     first = ScenarioAnswer("", True, "stable", least, "settles")
     monkeypatch.setattr(answer_of_run, "_by_response", lambda _: first)
-    found = answer_of_run.of_run(SimpleNamespace(after=after, modes=before, trips=()))
+    found = answer_of_run.of_run(SimpleNamespace(after=after, modes=before, trips=(), findings=()))
     console = Console(width=200, record=True, file=io.StringIO())
     console.print(answers_table([found], (0.1, 2.5)))
     return found, console.export_text(), least, after

@@ -340,7 +340,7 @@ def test_a_power_that_sharing_replaces_is_not_scolded_where_the_slack_is_lost(fi
 def test_nothing_remains_without_a_unit(five):
     (prepared,) = five.prepare(["base"])
     elements = Elements.of(prepared)
-    assert what_remains(prepared, elements, list(elements.units)).none
+    assert what_remains(prepared, elements, list(elements.units)).why_none
     both = what_remains(prepared, elements, ["line_15_11", "line_14_15"])
     # The slack's unit may feed 120 MW alone: an island, and the smaller side is what is cut off.
     assert (

@@ -18,7 +18,7 @@ from orchestrator.cases.networks.psse.load_records import records_for
 from orchestrator.cases.networks.psse.raw_network import FileLoad
 from orchestrator.core.errors import InputError
 from orchestrator.core.units import LARGEST
-from orchestrator.systems.coupling.relays import Quantity, RelayLimits
+from orchestrator.systems.coupling.relay_limits import Quantity, RelayLimits
 
 _OF_VOLTAGE = "VTG"  # how the names of relays of generators begin that watch a voltage
 OF_BUSES = ("VTGDCAT", "FRQDCAT")

@@ -8,7 +8,7 @@ from orchestrator.cases.networks.psse.dyr_records import read_dyr
 from orchestrator.cases.networks.psse.raw_network import FileLoad
 from orchestrator.cases.networks.psse.relay_records import load_relays, unit_relays
 from orchestrator.core.errors import InputError
-from orchestrator.systems.coupling.relays import RelayLimits
+from orchestrator.systems.coupling.relay_limits import RelayLimits
 
 LOADS = [
     FileLoad("load_1", 1, "1", 10, 5, 7, 80.0, 20.0, 80 + 20j),
