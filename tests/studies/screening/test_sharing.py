@@ -344,7 +344,7 @@ def test_nothing_remains_without_a_unit(five):
     both = what_remains(prepared, elements, ["line_15_11", "line_14_15"])
     # The slack's unit may feed 120 MW alone: an island, and the smaller side is what is cut off.
     assert (
-        both.none
+        both.why_none
         == "bus_5, bus_15 cut off, with 120 MW of load and the units sg5, which may go on alone"
     )
     plant = what_remains(prepared, elements, ["line_15_5"])
