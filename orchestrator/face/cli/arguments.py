@@ -19,7 +19,7 @@ from orchestrator.core.asked import (
 from orchestrator.core.errors import InputError
 from orchestrator.core.units import read_value, to_unit
 from orchestrator.studies.points.executor import Executor
-from orchestrator.studies.points.request import read_no_trip_code
+from orchestrator.systems.coupling.no_trip_regions import read_no_trip_code
 from orchestrator.systems.coupling.schedule import check_tolerance
 
 _ASKED = "asked_"  # before the name of a field whose own name is that of another option

@@ -19,7 +19,7 @@ from orchestrator.cases.settings.layers import OptionValues
 from orchestrator.core.asked import FLAG, FREQUENCIES, NAMES, FieldKind, asked, seen, text_or_none
 from orchestrator.core.errors import InputError
 from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ
-from orchestrator.systems.coupling.no_trip_regions import NO_TRIP_REGIONS
+from orchestrator.systems.coupling.no_trip_regions import NO_TRIP_REGIONS, read_no_trip_code
 
 POINTS_FILE = FieldKind(
     "FILE",
@@ -74,13 +74,6 @@ def _known_code(given: Any, argument: str) -> Any:
     raise InputError(
         f"{argument} = {seen(given)}; it must be one of {', '.join(NO_TRIP_REGIONS)}, or be left out"
     )
-
-
-def read_no_trip_code(text: str) -> str:
-    """Read the name of a code with a region in which nobody may trip."""
-    if text not in NO_TRIP_REGIONS:
-        raise ValueError(f"{text!r} is no code; choose one of {', '.join(NO_TRIP_REGIONS)}")
-    return text
 
 
 def of_protection(option: str | None = "") -> Any:

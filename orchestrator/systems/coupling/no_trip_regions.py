@@ -60,3 +60,10 @@ NO_TRIP_REGIONS: Mapping[NoTripCode, tuple[NoTripRegion, NoTripRegion]] = {
     "prc029": (_prc029("PRC-029", PRC029_LOW), _prc029("PRC-029 for wind", PRC029_LOW_WIND))
 }
 """Code → its region for plants other than wind, and for wind."""
+
+
+def read_no_trip_code(text: str) -> str:
+    """Read the name of a code with a region in which nobody may trip."""
+    if text not in NO_TRIP_REGIONS:
+        raise ValueError(f"{text!r} is no code; choose one of {', '.join(NO_TRIP_REGIONS)}")
+    return text

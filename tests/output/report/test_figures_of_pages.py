@@ -47,10 +47,10 @@ def folder(tmp_path_factory):
 
 
 def numbers_in(folder):
-    """All figures that the results' files hold."""
+    """All figures that the results' files hold; sizes of files, which manifests have, are none of a study."""
     held = {}
     for path in folder.glob("*/*"):
-        if path.suffix == ".json":
+        if path.suffix == ".json" and path.name != "manifest.json":
             held[path] = json.loads(path.read_text(encoding="utf-8"))
         if path.suffix == ".csv" and path.parent != folder:
             rows = csv.DictReader(path.read_text(encoding="utf-8").splitlines())
