@@ -95,8 +95,13 @@ def measured_elsewhere(m: ModelBuilder, current_scale: Expr) -> Measured:
     """Declare the inputs of a point of the network; ``current_scale``: S_n by the base of the system."""
     v = m.input("v", "pu", "Voltage magnitude at the measured bus", base="bus", start=1.0)
     v_0 = m.parameter("v_0", 1.0, "pu", "Power flow: voltage at the measured bus", base="bus")
+    return measured_branch(m, v, v_0, current_scale)
+
+
+def measured_branch(m: ModelBuilder, v: Expr, v_0: Expr, scale: Expr) -> Measured:
+    """Declare the power into a branch beside a measured voltage; ``scale``: S_n by the base of the system."""
     turned = m.switch("reversed", False, "The end that is measured is where p and q leave")
-    toward = if_else(turned, -1, 1) / current_scale
+    toward = if_else(turned, -1, 1) / scale
     P, Q = (
         m.input(name, "pu", f"{text} power into the measured branch", base=SYSTEM_BASE) * toward
         for name, text in (("p", "Active"), ("q", "Reactive"))

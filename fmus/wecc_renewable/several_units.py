@@ -27,9 +27,9 @@ from fmus.wecc_renewable.plant import (
     LEAST_LAG,
     LINES,
     Limits,
-    Measured,
     active_control,
     droop,
+    measured_branch,
     reactive_control,
     regulated_voltage,
 )
@@ -62,7 +62,7 @@ def plant_controller_phasor() -> Model:
     at = OperatingPoint(polar(v_0, theta_0), Phasor(0.0, 0.0), 2 * pi * f_n)
     seen = extrapolated_voltage(m, at, declare_master_step(m))
     seen.follow(m, v)
-    t = _measured(m, v.magnitude(), v_0, scale)
+    t = measured_branch(m, v.magnitude(), v_0, scale)
     compensates = m.switch("VCFlag", False, "Rc and Xc compensate; else Kc")
     mode = m.parameter(
         "RefFlag",
@@ -101,21 +101,6 @@ def plant_controller_phasor() -> Model:
         text = f"Change of the units' references of {what}"
         m.output(f"delta_{name}", changes[name] * scale, "pu", text, base=SYSTEM_BASE)
     return m.build()
-
-
-def _measured(m: ModelBuilder, v: Expr, v_0: Expr, scale: Expr) -> Measured:
-    """Declare power at the measured point; ``scale``: S_n by the base of the system."""
-    turned = m.switch("reversed", False, "The end that is measured is where p and q leave")
-    toward = if_else(turned, -1, 1) / scale
-    P, Q = (
-        m.input(name, "pu", f"{text} power into the measured branch", base=SYSTEM_BASE) * toward
-        for name, text in (("p", "Active"), ("q", "Reactive"))
-    )
-    P_0, Q_0 = (
-        m.parameter(name, 0.0, "pu", f"Power flow: {text} power into it", base=SYSTEM_BASE) * toward
-        for name, text in (("p_0", "active"), ("q_0", "reactive"))
-    )
-    return Measured(v, P, Q, v_0, P_0, Q_0, has_inputs=True)
 
 
 def _around_0(low: Expr, high: Expr) -> Limits:
