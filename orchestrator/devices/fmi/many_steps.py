@@ -39,7 +39,8 @@ class StepRows:
     late: Numbers | None = None
 
     def __post_init__(self) -> None:
-        if not all(one.flags.c_contiguous for one in (self.inputs, self.outputs)):
+        given = (self.inputs, self.outputs, self.late)
+        if not all(one.flags.c_contiguous for one in given if one is not None):
             raise ValueError("rows that C reads or fills must be contiguous")
         rows = (np.zeros(len(names)) for names in self.names)
         pairs = zip(self.names, rows, strict=True)
