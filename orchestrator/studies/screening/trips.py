@@ -49,7 +49,8 @@ def runs_sentence(summary: Summary) -> str:
 
 def runs_table(summary: Summary, most: int = 12) -> ColumnTable[ScreenedItem] | None:
     """Outages in whose runs anything happens besides; None without any."""
-    found = [item for item in summary.runs if item in summary.tripping or _is_wrong(item)]
+    told = (*summary.tripping, *summary.gone_wrong)
+    found = [item for item in summary.runs if item in told]
     if not found:
         return None
     return ColumnTable(
@@ -72,10 +73,6 @@ def run_columns(summary: Summary) -> tuple[Column[ScreenedItem], ...]:
     if not summary.runs:
         return ()
     return (Column("", _trips, name="trips"), Column("", _wrong, name="gone_wrong"))
-
-
-def _is_wrong(item: ScreenedItem) -> bool:
-    return item.record.run is not None and bool(item.record.run.went_wrong)
 
 
 def _trips(item: ScreenedItem) -> str:
