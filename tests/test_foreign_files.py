@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.cases.form.csv_rows import rows_of
-from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.records import read_records
 from orchestrator.cases.networks.source_changes import Changes, Remark
 from orchestrator.core import foreign_files

@@ -6,7 +6,7 @@ from dataclasses import replace
 from fmus.toolchain.model import Model
 from fmus.wecc_renewable.behind_impedance import REGCB1, REGCC1
 from fmus.wecc_renewable.converters import REGCA1, Kind
-from fmus.wecc_renewable.dyr_fields import AT_A_UNIT, ELSEWHERE
+from fmus.wecc_renewable.dyr_records import AT_A_UNIT, ELSEWHERE
 from fmus.wecc_renewable.electrical import Reeca1
 from fmus.wecc_renewable.electrical_blocking import Reecd1
 from fmus.wecc_renewable.electrical_storage import Reecc1

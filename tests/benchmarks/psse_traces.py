@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.new.new_case import write_case
 from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.core.errors import CaseError, InputError

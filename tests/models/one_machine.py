@@ -7,7 +7,7 @@ from scipy.optimize import fsolve
 
 from fmus.synchronous_generator.composed import synchronous_generator_phasor
 from orchestrator.cases.networks.psse.dyr import machine_models
-from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.raw_network import Machine
 from tests.support.evaluated import Evaluated
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fmus.distributed_generation.dyr_fields import DISTRIBUTED_RECORDS
+from fmus.distributed_generation.dyr_records import DISTRIBUTED_RECORDS
 from fmus.distributed_generation.model import dera1_phasor
 from orchestrator.cases.networks.psse.dyr import machine_models
-from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.raw_network import Machine
 from tests.models.parts import integrated, refused
 from tests.support.evaluated import Evaluated

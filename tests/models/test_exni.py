@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
+from fmus.synchronous_generator.dyr_records import DYR_RECORDS
 from tests.models.parts import AT_REST, E_FD, V_T, exciter, integrated, refused
 
 REST = AT_REST["exciter"]

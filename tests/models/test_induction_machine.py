@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import linear_sum_assignment
 
-from fmus.induction_machine.dyr_fields import INDUCTION_RECORDS
+from fmus.induction_machine.dyr_records import INDUCTION_RECORDS
 from fmus.induction_machine.model import induction_generator_phasor, induction_motor_phasor
 from orchestrator.cases.networks.psse.dyr import machine_models
-from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.raw_network import Machine
 from tests.benchmarks import andes_motors as andes
 from tests.models.parts import integrated, refused

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from fmus.synchronous_generator.composed import synchronous_generator, synchronous_generator_phasor
-from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
+from fmus.synchronous_generator.dyr_records import DYR_RECORDS
 from fmus.synchronous_generator.parts import EXCITERS, GOVERNORS, MACHINES, STABILIZERS
 from fmus.toolchain.catalogue import parts_of
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fmus.wecc_renewable.composed import wecc_plant_phasor
-from fmus.wecc_renewable.dyr_fields import CONTROLLER_RECORD
+from fmus.wecc_renewable.dyr_records import CONTROLLER_RECORD
 from fmus.wecc_renewable.several_units import plant_controller_phasor
 from tests.models.parts import integrated, refused
 from tests.models.renewable_by_hand import Plant, band, controller

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
+from fmus.synchronous_generator.dyr_records import DYR_RECORDS
 from orchestrator.cases.networks.psse.dyr import machine_models
-from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.raw_network import Machine
 from orchestrator.core.errors import InputError
 from tests.models.parts import (

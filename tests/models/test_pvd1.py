@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from fmus.distributed_generation.dyr_fields import DISTRIBUTED_RECORDS
+from fmus.distributed_generation.dyr_records import DISTRIBUTED_RECORDS
 from fmus.distributed_generation.pvd1 import pvd1_phasor
 from orchestrator.cases.networks.psse.dyr import machine_models
-from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.raw_network import Machine
 from tests.benchmarks import andes_pvd1 as andes
 from tests.models.parts import integrated, refused

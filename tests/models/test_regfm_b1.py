@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fmus.regfm_b1.dyr_fields import REGFM_B1_RECORDS
+from fmus.regfm_b1.dyr_records import REGFM_B1_RECORDS
 from fmus.regfm_b1.model import regfm_b1_phasor
 from tests.models import by_hand
 from tests.models.parts import integrated, refused

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fmus.wecc_renewable.composed import wecc_plant_phasor
-from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
+from fmus.wecc_renewable.dyr_records import PLANT_RECORDS
 from tests.models.parts import integrated, refused
 from tests.support.evaluated import Evaluated
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
-from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
+from fmus.wecc_renewable.dyr_records import PLANT_RECORDS
 from fmus.wecc_renewable.model import (
     regca1_phasor,
     regca1_repca1_phasor,
     regca1_repca1_remote_phasor,
 )
 from orchestrator.cases.networks.psse.dyr import machine_models
-from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.raw_network import Machine
 from tests.models.parts import integrated, refused
 from tests.models.renewable_by_hand import Plant, fields

@@ -19,7 +19,7 @@ from orchestrator.cases.form.schema import (
 )
 from orchestrator.cases.networks.data import network_data
 from orchestrator.cases.networks.element_names import ElementNames, names_without_units
-from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.static_vars import RECORDS, Modelled
 from orchestrator.cases.networks.sequence_data import windings_of
 from orchestrator.core.errors import InputError

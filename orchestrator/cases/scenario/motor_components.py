@@ -7,7 +7,7 @@ from orchestrator.cases.draft import Draft, UnitOrigin
 from orchestrator.cases.form.schema import ComponentTable, UnitsTable
 from orchestrator.cases.networks.load_models import is_open
 from orchestrator.cases.networks.psse.composite_loads import composite_loads, composite_remarks
-from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.load_records import with_recorded_laws
 from orchestrator.cases.networks.psse.motor_loads import (
     MotorLoad,

@@ -3,12 +3,12 @@
 import cmath
 from collections.abc import Collection, Iterator, Sequence
 
-from fmus.wecc_renewable.dyr_fields import CONTROLLER, CONTROLLER_RECORD
+from fmus.wecc_renewable.dyr_records import CONTROLLER, CONTROLLER_RECORD
 from orchestrator.cases.draft import Draft, UnitOrigin
 from orchestrator.cases.flow.power_flow import PowerFlow
 from orchestrator.cases.form.schema import ComponentTable, UnitsTable
 from orchestrator.cases.networks.data import bus_name
-from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.plant_controllers import (
     PlantController,
     plant_controllers,

@@ -8,7 +8,7 @@ from fmus.grid.network import Network
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.flow.power_flow import PowerFlow
 from orchestrator.cases.networks.data import bus_name
-from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.raw_network import unit_labels
 from orchestrator.cases.networks.psse.relay_records import (
     LoadRelay,

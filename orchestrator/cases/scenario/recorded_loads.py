@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.networks.load_models import is_open
-from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.frequency_records import recorded_frequency, with_frequency
 from orchestrator.cases.networks.psse.load_records import recorded_laws, with_recorded_laws
 

@@ -24,7 +24,7 @@ from orchestrator.cases.form.schema import ComponentTable, UnitsTable
 from orchestrator.cases.form.unusual_value import UnusualValue
 from orchestrator.cases.networks.conversion import Generation
 from orchestrator.cases.networks.data import bus_name
-from orchestrator.cases.networks.psse.dyr_records import DynamicRecord, read_dyr
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, read_dyr
 from orchestrator.cases.networks.psse.dyr_units import (
     completed,
     missing_records,

@@ -10,7 +10,7 @@ import pytest
 from fmus.converter_parts.usual import FOLLOWING
 from fmus.regfm_a1.model import USUAL
 from fmus.synchronous_generator.declarations import MACHINE
-from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
+from fmus.synchronous_generator.dyr_records import DYR_RECORDS
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.description import model_description
 from fmus.toolchain.model_builder import ModelBuilder

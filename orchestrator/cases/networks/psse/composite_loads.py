@@ -14,9 +14,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from fmus.grid.element_data import Load, Zip
-from fmus.induction_machine.dyr_fields import SUBSYSTEMS
+from fmus.induction_machine.dyr_records import SUBSYSTEMS
 from orchestrator.cases.networks.conversion import bus_of
-from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.load_records import (
     RecordedLaw,
     mean_of_laws,

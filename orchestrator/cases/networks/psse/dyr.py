@@ -3,7 +3,8 @@
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from fmus.grid_following.dyr_fields import FIELDS, MODEL
+from fmus.grid_following.dyr_approximation import FIELDS, MODEL
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.dyr_mistakes import (
     LEAST_STRANGE,
     count_repeats,
@@ -13,7 +14,6 @@ from orchestrator.cases.networks.psse.dyr_mistakes import (
     slips,
     without_machine,
 )
-from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
 from orchestrator.cases.networks.psse.following_converters import models_of_following
 from orchestrator.cases.networks.psse.limiter_records import place_limiters
 from orchestrator.cases.networks.psse.machine_model import (

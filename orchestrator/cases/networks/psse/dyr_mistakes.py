@@ -3,10 +3,10 @@
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-from fmus.grid_following.dyr_fields import FIELDS, MODEL
-from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
+from fmus.grid_following.dyr_approximation import FIELDS, MODEL
+from fmus.wecc_renewable.dyr_records import PLANT_RECORDS
 from orchestrator.cases.form.remedies import APPROXIMATING, replacement_of, without_models
-from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.machine_model import (
     KINDS_OF_CONVERTERS,
     KNOWN_RECORDS,

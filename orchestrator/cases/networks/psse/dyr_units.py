@@ -5,11 +5,11 @@ Parts of machines without a record are what [units] chooses for them, else what 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from fmus.synchronous_generator.dyr_fields import MACHINE_VARIANTS
+from fmus.synchronous_generator.dyr_records import MACHINE_VARIANTS
 from orchestrator.cases.form.unusual_value import UnusualValue
 from orchestrator.cases.networks.data import bus_name
 from orchestrator.cases.networks.psse.dyr import machine_models
-from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.limiter_records import LIMITERS
 from orchestrator.cases.networks.psse.machine_model import (
     CLASSICAL,

@@ -2,8 +2,8 @@
 
 from collections.abc import Collection, Sequence
 
-from fmus.grid_following.dyr_fields import FIELDS, MODEL
-from orchestrator.cases.networks.psse.dyr_records import EVENT, NUMBERED, DynamicRecord
+from fmus.grid_following.dyr_approximation import FIELDS, MODEL
+from orchestrator.cases.networks.psse.dyr_file import EVENT, NUMBERED, DynamicRecord
 from orchestrator.cases.networks.psse.limiter_records import UNHEARD, unheard_limiters
 from orchestrator.cases.networks.psse.machine_model import MANUAL
 from orchestrator.cases.networks.psse.missing_models import (

@@ -2,10 +2,10 @@
 
 from collections.abc import Collection, Mapping, Sequence
 
-from fmus.grid_following.dyr_fields import CONVERTER, FIELDS, MODEL, PLANT, approximation
-from fmus.synchronous_generator.dyr_fields import DyrField
+from fmus.grid_following.dyr_approximation import CONVERTER, FIELDS, MODEL, PLANT, approximation
+from fmus.toolchain.dyr_form import DyrField
 from orchestrator.cases.form.remedies import replacement_of
-from orchestrator.cases.networks.psse.dyr_records import DynamicRecord, given_values
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, given_values
 from orchestrator.cases.networks.psse.machine_model import MachineModel
 from orchestrator.cases.networks.source_changes import Remark
 from orchestrator.core.errors import InputError

@@ -5,17 +5,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from fmus.distributed_generation.dyr_fields import DISTRIBUTED_RECORDS
-from fmus.grid_following.dyr_fields import FIELDS, MODEL
-from fmus.induction_machine.dyr_fields import INDUCTION_RECORDS
-from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
-from fmus.regfm_b1.dyr_fields import REGFM_B1_RECORDS
-from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
-from fmus.synchronous_generator.dyr_fields import DYR_RECORDS, DyrRecord
-from fmus.wecc_renewable.dyr_fields import CONTROLLER, CONTROLLER_RECORD, PLANT_RECORDS
+from fmus.distributed_generation.dyr_records import DISTRIBUTED_RECORDS
+from fmus.grid_following.dyr_approximation import FIELDS, MODEL
+from fmus.induction_machine.dyr_records import INDUCTION_RECORDS
+from fmus.regfm_a1.dyr_records import REGFM_A1_RECORDS
+from fmus.regfm_b1.dyr_records import REGFM_B1_RECORDS
+from fmus.static_var.dyr_records import STATIC_VAR_RECORDS
+from fmus.synchronous_generator.dyr_records import DYR_RECORDS
+from fmus.toolchain.dyr_form import DyrRecord
+from fmus.wecc_renewable.dyr_records import CONTROLLER, CONTROLLER_RECORD, PLANT_RECORDS
 from orchestrator.cases.networks.psse.composite_loads import COMPOSITE_NAMES
 from orchestrator.cases.networks.psse.composite_loads import MODEL as MODEL_OF_MOTORS
-from orchestrator.cases.networks.psse.dyr_records import NUMBERED
+from orchestrator.cases.networks.psse.dyr_file import NUMBERED
 from orchestrator.cases.networks.psse.frequency_records import FREQUENCY_RECORDS
 from orchestrator.cases.networks.psse.limiter_records import LIMITERS
 from orchestrator.cases.networks.psse.load_records import LOAD_RECORDS

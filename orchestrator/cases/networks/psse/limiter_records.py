@@ -2,8 +2,8 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
-from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
-from orchestrator.cases.networks.psse.dyr_records import DynamicRecord, given_values
+from fmus.synchronous_generator.dyr_records import DYR_RECORDS
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, given_values
 
 LIMITERS = ("oel", "uel")
 """Kinds of records that are limiters, of over- and of underexcitation."""

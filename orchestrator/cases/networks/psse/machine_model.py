@@ -4,13 +4,13 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from fmus.distributed_generation.dyr_fields import DISTRIBUTED_RECORDS
-from fmus.induction_machine.dyr_fields import INDUCTION_RECORDS
-from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
-from fmus.regfm_b1.dyr_fields import REGFM_B1_RECORDS
-from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
-from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
-from fmus.wecc_renewable.dyr_fields import AT_A_UNIT, ELSEWHERE, PLANT_MODEL, PLANT_RECORDS
+from fmus.distributed_generation.dyr_records import DISTRIBUTED_RECORDS
+from fmus.induction_machine.dyr_records import INDUCTION_RECORDS
+from fmus.regfm_a1.dyr_records import REGFM_A1_RECORDS
+from fmus.regfm_b1.dyr_records import REGFM_B1_RECORDS
+from fmus.static_var.dyr_records import STATIC_VAR_RECORDS
+from fmus.synchronous_generator.dyr_records import DYR_RECORDS
+from fmus.wecc_renewable.dyr_records import AT_A_UNIT, ELSEWHERE, PLANT_MODEL, PLANT_RECORDS
 from orchestrator.cases.networks.measured_point import MeasuredPoint
 from orchestrator.cases.networks.unit_row import DoubtOfRecord
 

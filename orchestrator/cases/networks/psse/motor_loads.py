@@ -9,10 +9,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from fmus.grid.element_data import Load
-from fmus.induction_machine.dyr_fields import MOTOR_RECORDS, SUBSYSTEMS
-from fmus.synchronous_generator.dyr_fields import DyrRecord
+from fmus.induction_machine.dyr_records import MOTOR_RECORDS, SUBSYSTEMS
+from fmus.toolchain.dyr_form import DyrRecord
 from orchestrator.cases.networks.conversion import bus_of
-from orchestrator.cases.networks.psse.dyr_records import DynamicRecord, number_of_field
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, number_of_field
 from orchestrator.cases.networks.psse.load_records import records_for
 from orchestrator.cases.networks.psse.raw_network import FileLoad
 from orchestrator.cases.networks.psse.record_values import values_of_record

@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from fmus.wecc_renewable.dyr_fields import AT_A_UNIT, CONTROLLER, CONTROLLER_RECORD
+from fmus.wecc_renewable.dyr_records import AT_A_UNIT, CONTROLLER, CONTROLLER_RECORD
 from orchestrator.cases.networks.measured_point import MeasuredPoint
-from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.plant_points import number_of_bus, point_of_record
 from orchestrator.cases.networks.psse.record_values import values_of_record
 from orchestrator.core.errors import InputError

@@ -3,9 +3,9 @@
 import re
 from collections.abc import Mapping, Sequence
 
-from fmus.grid_following.dyr_fields import PLANT
+from fmus.grid_following.dyr_approximation import PLANT
 from orchestrator.cases.networks.measured_point import MeasuredPoint
-from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.core.errors import InputError
 
 _PLACES = 4  # first values of REPCA1: the bus and the branch that are measured

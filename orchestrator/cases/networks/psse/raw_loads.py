@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from orchestrator.cases.networks.bus_loads import BusLoads
 from orchestrator.cases.networks.psse.controls import shunt_blocks, shunt_record
-from orchestrator.cases.networks.psse.dyr_records import ONLY_SHUNT, shunt_name
+from orchestrator.cases.networks.psse.dyr_file import ONLY_SHUNT, shunt_name
 from orchestrator.cases.networks.psse.raw_network import FileLoad
 from orchestrator.cases.networks.psse.raw_tables import RawTables, is_in_service
 from orchestrator.cases.networks.psse.records import NODES, Record

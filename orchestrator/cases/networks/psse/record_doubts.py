@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from fmus.grid_following.dyr_fields import FIELDS
-from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
-from orchestrator.cases.networks.psse.dyr_records import DynamicRecord, given_values
+from fmus.grid_following.dyr_approximation import FIELDS
+from fmus.synchronous_generator.dyr_records import DYR_RECORDS
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, given_values
 from orchestrator.cases.networks.psse.machine_model import KNOWN_RECORDS
 from orchestrator.cases.networks.psse.raw_network import Machine
 from orchestrator.cases.networks.psse.record_values import CEILING, FLOOR, chosen_ceiling

@@ -2,14 +2,14 @@
 
 from collections.abc import Mapping
 
-from fmus.grid_following.dyr_fields import FIELDS, MODEL
-from fmus.synchronous_generator.dyr_fields import (
+from fmus.grid_following.dyr_approximation import FIELDS, MODEL
+from fmus.toolchain.dyr_form import (
     SIGNALS_OF_BUSES,
     DyrField,
     DyrRecord,
 )
 from orchestrator.cases.form.remedies import APPROXIMATING, without_models
-from orchestrator.cases.networks.psse.dyr_records import DynamicRecord, given_values
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, given_values
 from orchestrator.cases.networks.psse.machine_model import KNOWN_RECORDS
 from orchestrator.core.errors import InputError
 

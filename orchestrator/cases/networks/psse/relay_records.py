@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 
-from orchestrator.cases.networks.psse.dyr_records import NUMBERED, DynamicRecord
+from orchestrator.cases.networks.psse.dyr_file import NUMBERED, DynamicRecord
 from orchestrator.cases.networks.psse.load_records import records_for
 from orchestrator.cases.networks.psse.raw_network import FileLoad
 from orchestrator.core.errors import InputError

@@ -6,7 +6,7 @@ that does. SVSMO1T2 is of a switched shunt."""
 from collections.abc import Collection, Iterator
 from dataclasses import replace
 
-from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
+from fmus.static_var.dyr_records import STATIC_VAR_RECORDS
 from orchestrator.cases.networks.psse.facts_devices import FactsDevice
 from orchestrator.cases.networks.psse.raw_loads import switched_shunts
 from orchestrator.cases.networks.psse.raw_network import Machine

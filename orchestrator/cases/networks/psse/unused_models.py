@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 from orchestrator.cases.form.schema import LoadModelTable
 from orchestrator.cases.networks.psse.composite_loads import COMPOSITE_NAMES
-from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.limiter_records import UNHEARD
 from orchestrator.cases.networks.psse.missing_models import (
     DEVICE,

@@ -8,7 +8,7 @@ from orchestrator.cases.networks.psse.composite_loads import (
     composite_loads,
     composite_remarks,
 )
-from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.motor_loads import loads_without
 from orchestrator.cases.networks.psse.raw_network import FileLoad
 from orchestrator.cases.networks.record_use import UseOfRecord

@@ -5,9 +5,9 @@ import re
 
 import pytest
 
-from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
+from fmus.synchronous_generator.dyr_records import DYR_RECORDS
 from orchestrator.cases.case import load_case
-from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.core.errors import CaseError, InputError
 from tests.cases.networks.psse import raw, records
 

@@ -8,7 +8,7 @@ import pytest
 
 from orchestrator.cases.networks.psse import missing_models
 from orchestrator.cases.networks.psse.dyr import machine_models
-from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.dyr_units import without_idle_controls
 from orchestrator.cases.networks.psse.dyr_uses import record_uses
 from orchestrator.cases.networks.psse.known_records import known_records

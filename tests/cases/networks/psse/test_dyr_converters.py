@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
+from fmus.regfm_a1.dyr_records import REGFM_A1_RECORDS
 from fmus.toolchain.catalogue import build_model
 from orchestrator.cases.case import load_case
 from orchestrator.core.errors import CaseError

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from fmus.grid_following.dyr_fields import FIELDS, MODEL, approximation
+from fmus.grid_following.dyr_approximation import FIELDS, MODEL, approximation
 from fmus.toolchain.catalogue import build_model
 from orchestrator.core.errors import CaseError
 from tests.cases.networks.psse import raw

@@ -5,7 +5,7 @@ import json
 import pytest
 import xarray as xr
 
-from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
+from fmus.wecc_renewable.dyr_records import PLANT_RECORDS
 from orchestrator.cases.case import load_case, with_protection
 from orchestrator.core.errors import CaseError
 from tests.cases.networks.psse.test_dyr_following import REGCA1, dyr, prepared, record

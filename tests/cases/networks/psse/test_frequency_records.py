@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from fmus.grid.element_data import LAWS, Load
-from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.frequency_records import recorded_frequency, with_frequency
 from orchestrator.cases.networks.psse.raw_network import FileLoad
 from orchestrator.cases.networks.record_use import UseOfRecord

@@ -2,9 +2,9 @@
 
 import pytest
 
-from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
+from fmus.synchronous_generator.dyr_records import DYR_RECORDS
 from orchestrator.cases.networks.psse.dyr import machine_models
-from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.dyr_uses import record_uses
 from orchestrator.cases.networks.psse.raw_network import Machine
 from orchestrator.cases.networks.psse.unused_models import unused_models

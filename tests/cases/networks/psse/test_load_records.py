@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fmus.grid.element_data import Load, Zip
-from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.load_records import (
     RecordedLaw,
     recorded_laws,

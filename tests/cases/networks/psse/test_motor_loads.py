@@ -7,7 +7,7 @@ from scipy.optimize import linear_sum_assignment
 from fmus.grid.element_data import Load
 from fmus.induction_machine.model import induction_motor_phasor
 from orchestrator.cases.case import load_case
-from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.motor_loads import loads_without, motor_loads, motor_remarks
 from orchestrator.cases.networks.psse.raw_network import FileLoad
 from orchestrator.cases.networks.record_use import UseOfRecord

@@ -4,7 +4,7 @@ from math import inf
 
 import pytest
 
-from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.raw_network import FileLoad
 from orchestrator.cases.networks.psse.relay_records import load_relays, unit_relays
 from orchestrator.core.errors import InputError

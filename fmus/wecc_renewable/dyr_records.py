@@ -1,6 +1,6 @@
 """Records of WECC's generic plants in a PSS/E dynamics file (DYR) → parameters of `wecc_plant_phasor` and its like."""
 
-from fmus.synchronous_generator.dyr_fields import records_beside
+from fmus.toolchain.dyr_form import records_beside
 
 _RECORDS = records_beside(__file__)
 _OF_BUS = "plants"  # kind of a controller of several units, whose record is of a bus

@@ -1,9 +1,7 @@
-"""Records of a PSS/E dynamics file (DYR) → parts of `synchronous_generator` and their parameters.
+"""The form of ``dyr_records.toml``: which part of a model a record of a PSS/E dynamics file (DYR) is, and what it sets.
 
-Plain data without equations: a reader of DYR files takes from here which part a record is, and which parameters its
-fields set. Fields stand in the file's order: ``bus 'NAME' id field field … /``. Field names are PSS/E's.
-
-Sources: PSS/E's model library as it is described in public (PowerWorld's and NEPLAN's model guides, ANDES' reader)."""
+Plain data without equations. Fields stand in the file's order: ``bus 'NAME' id field field … /``. Field names are
+PSS/E's; the first lines of `fmus/synchronous_generator/dyr_records.toml` say how a field is written."""
 
 import re
 import tomllib
@@ -155,12 +153,3 @@ def records_beside(module: str) -> dict[str, DyrRecord]:
     """The records of ``dyr_records.toml`` beside a module's file, by PSS/E's name."""
     tables = tomllib.loads(Path(module).with_name("dyr_records.toml").read_text(encoding="utf-8"))
     return {name: _record(table) for name, table in tables.items()}
-
-
-DYR_RECORDS = records_beside(__file__)
-"""By PSS/E's name. What a part holds and a record does not set keeps our default: give X'_d of GENCLS, and R_s of
-every machine, from the network data (ZSORCE) as ``machine.X_d1`` and ``machine.R_s``; machine data are on ``S_n``
-unless ``machine.S_data`` [MVA] says otherwise, as MBASE does."""
-
-MACHINE_VARIANTS = {"genrou_rated_speed": "genrou"}
-"""Machines that have the fields of another one's record, and differ in an assumption."""

@@ -7,18 +7,16 @@ on references is not taken over; `approximation` names every field that it leave
 Sources: the order of fields as ANDES' reader and GridPACK's take it; the block diagrams as WECC's guide for generic
 wind and solar models shows them."""
 
-import tomllib
 from collections.abc import Mapping
-from pathlib import Path
+
+from fmus.wecc_renewable.dyr_records import PLANT_RECORDS
 
 MODEL = "gfl_phasor"
 
 CONVERTER = "REGCA1"
 FIELDS: dict[str, tuple[str, ...]] = {
-    record: tuple(fields.split())
-    for record, fields in tomllib.loads(
-        Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-    ).items()
+    record: tuple(field.name for field in PLANT_RECORDS[record].fields)
+    for record in (CONVERTER, "REECA1", "REECB1")
 }
 """Fields behind the identifier of the machine, in the file's order, by PSS/E's name of the record."""
 

@@ -1,6 +1,6 @@
 """Records of induction machines in a PSS/E dynamics file (DYR) → parameters of our models."""
 
-from fmus.synchronous_generator.dyr_fields import records_beside
+from fmus.toolchain.dyr_form import records_beside
 
 _RECORDS = records_beside(__file__)
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fmus.synchronous_generator.dyr_fields import DyrField
+from fmus.toolchain.dyr_form import DyrField
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import read_text, visible
 from orchestrator.core.units import LARGEST
