@@ -55,6 +55,7 @@ class DraftInput:
     whole: bool = True
     injections: bool = False  # as in `CaseDefinition`
     faulted: frozenset[str] = frozenset()  # as in `CaseDefinition`
+    line_ends: frozenset[str] = frozenset()  # as in `CaseDefinition`
     # components whose device is another than the file's own, which no layer's value reaches.
     exchanged: frozenset[str] = frozenset()
     # variables, by ``component.variable``, that the command line or its parameter files set.

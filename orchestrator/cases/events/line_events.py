@@ -48,7 +48,7 @@ def _beyond_transients(table: schema.FaultBase | schema.LineTripTable) -> Iterat
 
 def _is_of_phasors(draft: Draft, grid: str) -> bool:
     plan = draft.system.components.get(grid)
-    return plan is None or any(name.endswith(".e_re") for name in plan.description.inputs)
+    return plan is None or plan.is_of_phasors
 
 
 def _bus_fault(table: schema.BusFaultTable, grid: str) -> list[Event]:

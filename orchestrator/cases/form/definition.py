@@ -51,6 +51,8 @@ class CaseDefinition:
     # whether the grid takes a current besides at every bus; see `Network.injections`
     injections: bool = False
     faulted: frozenset[str] = frozenset()  # buses with a fault besides those of the file's events
+    # lines whose ends switch one by one, besides those of the file's events
+    line_ends: frozenset[str] = frozenset()
     # variables, by ``component.variable``, that a study varies: their values are meant, whatever is usual
     varied: frozenset[str] = frozenset()
 

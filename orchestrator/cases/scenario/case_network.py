@@ -243,7 +243,7 @@ def _with_switches(network: Network, draft: Draft, *, phasors: bool) -> Network:
         for table in tables
         if isinstance(table, ShuntTripTable | ShuntReconnectionTable)
     }
-    network = _with_line_parts(network, tables) if phasors else network
+    network = _with_line_parts(network, tables, draft.given.line_ends) if phasors else network
     if not (faults or switched):
         return network
     shunts = tuple(replace(shunt, switched=shunt.name in switched) for shunt in network.shunts)
@@ -252,10 +252,12 @@ def _with_switches(network: Network, draft: Draft, *, phasors: bool) -> Network:
     )
 
 
-def _with_line_parts(network: Network, tables: Sequence[EventTable]) -> Network:
+def _with_line_parts(
+    network: Network, tables: Sequence[EventTable], line_ends: frozenset[str]
+) -> Network:
     """The network with lines whose ends switch one by one, and with faults along lines."""
     faulted = {table.line for table in tables if isinstance(table, LineFaultTable)}
-    ends = {
+    ends = line_ends | {
         table.line for table in tables if isinstance(table, LineTripTable) and table.at is not None
     }
     if not (faulted | ends):

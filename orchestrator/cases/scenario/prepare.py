@@ -259,6 +259,7 @@ class Preparer:
             whole=case.numbered,
             injections=case.injections,
             faulted=case.faulted,
+            line_ends=case.line_ends,
             exchanged=frozenset(case.exchanged),
             from_outside=outside,
             varied=case.varied,

@@ -21,7 +21,7 @@ from orchestrator.cases.questions.idle_values import switches_of, why_idle
 from orchestrator.cases.scenario.service import in_service
 from orchestrator.cases.settings.layers import OptionValues
 from orchestrator.core.arrays import Complex
-from orchestrator.core.errors import CosimError, InputError
+from orchestrator.core.errors import CosimError, InputError, few
 from orchestrator.core.spelling import as_options
 from orchestrator.devices.fmi.interrupts import calls
 from orchestrator.face.api.case import Case, load
@@ -34,8 +34,10 @@ from orchestrator.face.explore.responses import linear, plotted, recorded, simul
 from orchestrator.studies.modes.modes import modes_of
 from orchestrator.studies.operating_points.bench import PointBench
 from orchestrator.studies.operating_points.item import Item
+from orchestrator.studies.operating_points.line_ends import lines_with_ends
 from orchestrator.studies.operating_points.preparation import ItemPreparation
 
+_SHOWN = 3  # lines that a message names
 _CHANGE = 2e-3  # of the parameter, in parts of its value, or of 1 where that is 0
 # an eigenvalue that moves by more than this part of itself is no longer known to be the same
 _FAR = 0.05
@@ -203,6 +205,12 @@ class Desk:
         own, lost = ([str(name) for name in question.get(key) or ()] for key in ("own", "lost"))
         if not own and not lost:
             return values
+        opening = sorted(lines_with_ends((*own, *lost)))
+        if opening:
+            raise InputError(
+                f"{few(opening, _SHOWN)} open at one end in this cell, which a case that is explored live shows only "
+                "as an event: add a line_trip with 'at' to [[events]] of the case"
+            )
         rule, base, step = question.get("sharing"), question.get("base"), question.get("step")
         network = case.file.table.network
         if question.get("move_controls") and lost and not (network and network.move_controls):

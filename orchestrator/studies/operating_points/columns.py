@@ -36,6 +36,9 @@ class Elements:
     # branch whose loss is that of a unit alone → the unit
     step_ups: Mapping[str, str] = field(default_factory=dict)
     file: ElementNames = field(default_factory=ElementNames)  # names in the network's file
+    # both buses of every branch with two ends
+    ends: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    of_phasors: bool = False  # whether ends of lines can switch one by one
 
     @classmethod
     def of(cls, prepared: PreparedScenario) -> "Elements":
@@ -63,6 +66,8 @@ class Elements:
             balancing=prepared.power_flow.balancing if prepared.power_flow else (),
             step_ups=own_branches(network, units),
             file=prepared.names,
+            ends={line.name: (line.from_bus, line.to_bus) for line in network.lines},
+            of_phasors=prepared.system.components[table.grid].is_of_phasors,
         )
 
     @property

@@ -10,6 +10,7 @@ from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError, few
 from orchestrator.core.options import Option
 from orchestrator.studies.operating_points.columns import Elements
+from orchestrator.studies.operating_points.line_ends import LineEnd, line_of, read_end
 
 INTACT = "intact"  # name of the network without an outage
 _KINDS = ("n-1", "lines", "units")
@@ -35,7 +36,7 @@ def read_outages(text: str | None, elements: Elements) -> list[Outage]:
 
     ``text``: ``n-1`` (each line, transformer and unit; a unit with its own transformer is one outage), ``lines``,
     ``units``, or names with commas between them; None for none. ``line_1_2+sg3`` loses two elements together, and so
-    does ``sg3 (line_6_1)``, as a unit with its own transformer is called.
+    does ``sg3 (line_6_1)``, as a unit with its own transformer is called; ``line_1_2 at bus_1`` opens one end.
     Names in the network's file mean their elements."""
     names: list[str] = []
     for part in (part.strip() for part in (text or "").split(",") if part.strip()):
@@ -47,30 +48,25 @@ def read_outages(text: str | None, elements: Elements) -> list[Outage]:
     found = [Outage(INTACT)]
     for name in names:
         parts = _WITH_TRANSFORMER.sub(r"\1+\2", name).split("+")
-        lost = tuple(
-            elements.file.identifier(one.strip(), elements.names, Option.OUTAGES) for one in parts
-        )
-        for one in lost:
-            line, at, _ = one.partition(" at ")
-            if at and line in elements.lines:
-                raise InputError(
-                    Option.OUTAGES
-                    + f": {one!r}: an outage opens a line at both ends. One end alone is a point's value: a column "
-                    f"{elements.grid}.{line}.from_connected (or to_connected) with false in the file of "
-                    + Option.POINTS
-                    + ", where an event of the case, a line_trip with 'at', opens that line at one end"
-                )
-            if one not in elements.names:
-                hint = close_names(
-                    one, elements.names, f"write {', '.join(_KINDS)}, or names of elements"
-                )
-                raise InputError(
-                    Option.OUTAGES + f": there is no unit, line, load or shunt {one!r}; {hint}"
-                )
+        lost = tuple(_element(one.strip(), elements) for one in parts)
         if any(set(lost) == set(other.elements) for other in found) or len(set(lost)) < len(lost):
             raise InputError(Option.OUTAGES + f": {name} is named twice; name it once")
         found.append(Outage(name, lost))
     return found
+
+
+def _element(text: str, elements: Elements) -> str:
+    """Return the identifier of the element, or of the end of a line, that a text names."""
+    found = elements.file.identifier(text, elements.names, Option.OUTAGES)
+    if found in elements.names:
+        return found
+    end = read_end(text, elements)
+    if end is None:
+        hint = close_names(text, elements.names, f"write {', '.join(_KINDS)}, or names of elements")
+        raise InputError(
+            Option.OUTAGES + f": there is no unit, line, load or shunt {text!r}; {hint}"
+        )
+    return end.element
 
 
 def _of_kind(kind: str, elements: Elements) -> list[str]:
@@ -99,6 +95,8 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
     network, grid = prepared.network, prepared.system.components[elements.grid]
     assert network is not None
     values = grid.parameters
+    opened_ends = [end for end in map(LineEnd.of, out) if end is not None]
+    out = tuple(map(line_of, out))
     branches = [(x.name, x.from_bus, x.to_bus) for x in network.lines]
     branches += [(x.name, x.buses[0], bus) for x in network.transformers for bus in x.buses[1:]]
     part = connected_parts(
@@ -137,13 +135,14 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
             f"{few(dead, _SHOWN)} cut off by branches that the case or the point has open"
         )
     opened = set(out) - set(ties)
+    charged = {end.line for end in opened_ends if end.bus in dead}  # from the bus that remains
     loads = tuple(
         x.name for x in network.loads if x.name in out or (part[x.bus] != main and power[x.name])
     )
     charging = tuple(
         x.variable("B")
         for x in network.lines
-        if x.B and x.name not in opened and {x.from_bus, x.to_bus} & set(dead)
+        if x.B and x.name not in opened | charged and {x.from_bus, x.to_bus} & set(dead)
     )
     return Remains(
         units=tuple(

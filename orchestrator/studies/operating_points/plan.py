@@ -14,6 +14,7 @@ from orchestrator.core.asked import Names
 from orchestrator.core.errors import InputError
 from orchestrator.studies.operating_points.columns import Elements
 from orchestrator.studies.operating_points.item import Item
+from orchestrator.studies.operating_points.line_ends import lines_with_ends
 from orchestrator.studies.operating_points.outages import Outage, read_outages
 from orchestrator.studies.operating_points.points_file import (
     OperatingCase,
@@ -54,13 +55,21 @@ def read_operating_points(
     overrides = {
         key: value for key, value in request.overrides.items() if key not in (off or {})
     } | dict(off or {})
-    (prepared,) = case.prepare([name], overrides, request.step_size, None, request.files)
+
+    def prepare(case: Case) -> PreparedScenario:
+        return case.prepare([name], overrides, request.step_size, None, request.files)[0]
+
+    prepared = prepare(case)
     layers = (*request.files, *([OptionValues.of(overrides)] if overrides else []))
     elements = Elements.of(prepared)
     own = OperatingCase("case", 1.0, {}, (), str(case.path))
     rows = [own] if points is None else read_points(Path(points), prepared, elements)
     asked = () if points is None else tuple(questions_about(Path(points), rows, prepared, elements))
     lost = read_outages(cast("str | None", outages), elements)
+    opening = lines_with_ends(element for outage in lost for element in outage.elements)
+    if opening:
+        case = replace(case, line_ends=opening)
+        prepared = prepare(case)
     if len(rows) * len(lost) > _MOST:
         raise InputError(
             f"{points}: {len(rows)} operating points with {len(lost)} outages are {len(rows) * len(lost)}; at most "

@@ -19,6 +19,7 @@ from orchestrator.core.errors import CosimError, ErrorKind, InputError, StartErr
 from orchestrator.core.options import Option
 from orchestrator.studies.operating_points.columns import Elements, least_scale
 from orchestrator.studies.operating_points.item import Item, Status
+from orchestrator.studies.operating_points.line_ends import LineEnd, line_of
 from orchestrator.studies.operating_points.outages import Remains, what_remains
 from orchestrator.studies.points.failure import Failure
 from orchestrator.systems.coupling.system import System
@@ -115,7 +116,7 @@ class ItemPreparation:
             dispatch = Dispatch(self._sharing, before.power_flow.powers, fed - drawn)
         elif new := [bus for bus in remains.dead if bus not in without.dead]:
             text = f"{few(new, _SHOWN)} cut off, with neither load nor unit"
-        values = {**item.values, **switched_off(item.out, remains, valued, self.elements.grid)}
+        values = {**item.values, **switched_off(item.out, remains, valued, self.elements)}
         found = self._prepare(values, dispatch, voltages_before)
         if dispatch is not None:
             assert found.power_flow is not None
@@ -143,7 +144,7 @@ class ItemPreparation:
         remains = what_remains(valued, self.elements, item.out)
         prepared = self.prepared(item)
         scenario = prepared.scenario
-        found = {**item.values, **switched_off(item.out, remains, valued, self.elements.grid)}
+        found = {**item.values, **switched_off(item.out, remains, valued, self.elements)}
         shared = prepared.text or {*item.out, *remains.units} & {*self.elements.units}
         if shared and scenario.power_flow is not None:
             # else the case would share what the item leaves to the slack
@@ -173,7 +174,7 @@ class ItemPreparation:
     ) -> PreparedScenario:
         """The item's operating point before its outage; that of the last item serves all of one point."""
         if self._before is None or self._before[0] != item.point:
-            off = switched_off(own, without, self._valued(item), self.elements.grid)
+            off = switched_off(own, without, self._valued(item), self.elements)
             self._before = item.point, self._prepare({**item.values, **off})
         return self._before[1]
 
@@ -280,17 +281,23 @@ _DEAD_CHARGING = 1e-3
 
 
 def switched_off(
-    out: Sequence[str], remains: Remains, prepared: PreparedScenario, grid: str
+    out: Sequence[str], remains: Remains, prepared: PreparedScenario, elements: Elements
 ) -> dict[str, Value]:
     """Values that take elements out of service in the power flow and in the grid, with all that is dead then."""
     opened = [
         name
         for name in (*out, *remains.units, *remains.shunts)
-        if name not in remains.loads and name not in remains.ties
+        if name not in remains.loads and line_of(name) not in remains.ties
     ]
-    values: dict[str, Value] = {f"{grid}.{name}.connected": False for name in opened}
+    grid = elements.grid
+    values: dict[str, Value] = {f"{grid}.{_switch(name, elements)}": False for name in opened}
     plan = prepared.system.components[grid]
     values |= {f"{grid}.{name}.scale": least_scale(name, plan) for name in remains.loads}
     return values | {
         f"{grid}.{name}": _DEAD_CHARGING * plan.number(name) for name in remains.charging
     }
+
+
+def _switch(element: str, elements: Elements) -> str:
+    end = LineEnd.of(element)
+    return f"{element}.connected" if end is None else end.switch(elements)

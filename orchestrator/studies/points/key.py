@@ -73,6 +73,7 @@ def same_case(
     wanted: str,
     trust_fmus: bool = False,
     varied: frozenset[str] = frozenset(),
+    line_ends: frozenset[str] = frozenset(),
 ) -> Case:
     """The case of a task, as a worker sees it."""
     case = load_case(reference, trust_fmus=trust_fmus)
@@ -91,7 +92,7 @@ def same_case(
             f"{case.source}: this file{which} has another text now than when the study loaded it; load the case again, "
             "and on a cluster give all machines the same files"
         )
-    return replace(case, varied=varied) if varied else case
+    return replace(case, varied=varied, line_ends=line_ends) if varied | line_ends else case
 
 
 def sha256_of(path: Path) -> str:

@@ -41,6 +41,7 @@ class StudyCase:
     trust_fmus: bool  # as `load_case`: the user's word holds in every worker
     mark: str  # hash of all of it, and of the FMUs
     varied: frozenset[str] = frozenset()  # as in `CaseDefinition`
+    line_ends: frozenset[str] = frozenset()  # as in `CaseDefinition`
 
     @classmethod
     def of(
@@ -73,6 +74,7 @@ class StudyCase:
             trust_fmus=case.trust_fmus,
             mark=digest(content),
             varied=frozenset(varied),
+            line_ends=case.line_ends,
         )
 
     def prepare(self, case: Case, values: Mapping[str, Value]) -> PreparedScenario:
@@ -145,7 +147,9 @@ def computed(task: AnyTask, compute: Callable[[AnyTask, Case], Out]) -> Out:
 
     Its texts name options as they are typed, in every worker process: a kept point is the same for everybody."""
     study = task.study
-    case = same_case(study.reference, study.fingerprint, study.trust_fmus, study.varied)
+    case = same_case(
+        study.reference, study.fingerprint, study.trust_fmus, study.varied, study.line_ends
+    )
     with alone(), as_options():
         try:
             return compute(task, case)

@@ -15,12 +15,14 @@ from orchestrator.simulation.watch.watch import Watch
 from orchestrator.studies.modes.modes import running
 from orchestrator.studies.operating_points.columns import least_scale
 from orchestrator.studies.operating_points.item import Item
+from orchestrator.studies.operating_points.line_ends import LineEnd
 from orchestrator.studies.operating_points.outages import what_remains
 from orchestrator.studies.operating_points.preparation import ItemPreparation
 from orchestrator.studies.screening.record import OutageRun, RelayTrip, WentWrong
 from orchestrator.systems.coupling.events import (
     BusFault,
     Event,
+    LineEndSwitching,
     LineSwitching,
     LoadChange,
     ShuntSwitching,
@@ -87,8 +89,9 @@ class OutageRuns:
 
 
 def first_bus(item: Item, prepared: PreparedScenario) -> str:
-    """Return the first bus of what an outage takes, at which its fault is."""
-    return prepared.buses_of[item.lost[0]][0]
+    """Return the first bus of what an outage takes, of an open end its own, at which its fault is."""
+    end = LineEnd.of(item.lost[0])
+    return end.bus if end is not None else prepared.buses_of[item.lost[0]][0]
 
 
 def _outage(
@@ -111,8 +114,11 @@ def _outage(
             has_breaker = "connected" in plans[name].description.variables
             yield UnitSwitching(at, grid, name, False, has_breaker)
     for name in item.lost:
+        end = LineEnd.of(name)
         if name in elements.lines and name not in left.ties:
             yield LineSwitching(at, grid, name, False)
+        elif end is not None and end.line not in left.ties:
+            yield LineEndSwitching(at, grid, end.line, end.side(elements), False)
     shunts = dict.fromkeys([*(x for x in item.lost if x in elements.shunts), *left.shunts])
     for name in shunts:
         if name not in was.shunts:

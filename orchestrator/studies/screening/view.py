@@ -34,6 +34,7 @@ from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.output.results.staging import new_run_id, staged
 from orchestrator.output.results.storage import save_json
 from orchestrator.studies.operating_points.item import Status
+from orchestrator.studies.operating_points.line_ends import line_of
 from orchestrator.studies.screening.limits import (
     limit_columns,
     limits_json,
@@ -257,7 +258,8 @@ def overview(summary: Summary, most: int = 12) -> ColumnTable[OutageRow]:
     at = {(item.outage.name, item.point.name): item for item in summary.result.items}
     title = f"Least damping [%] below {100 * plan.wanted.damping:g} %, worst outage first"
     columns = [Column[OutageRow]("Outage", lambda row: row.name)]
-    prepared, out = plan.prepared, {one.name: one.elements for one in plan.outages}
+    prepared = plan.prepared
+    out = {one.name: tuple(map(line_of, one.elements)) for one in plan.outages}
     if prepared.regions.has_areas:
         columns.append(Column("Area", lambda row: prepared.area_of(*out.get(row.name, ()))))
     texts = len(columns)

@@ -13,6 +13,8 @@ from orchestrator.linear.spectra.stability import zeros_in_words
 from orchestrator.output.report.tables import VerdictSentence
 from orchestrator.studies.operating_points.columns import Elements
 from orchestrator.studies.operating_points.item import Status
+from orchestrator.studies.operating_points.line_ends import LineEnd
+from orchestrator.studies.operating_points.outages import Outage
 from orchestrator.studies.operating_points.points_file import OperatingCase
 from orchestrator.studies.screening.modes import UNSTABLE
 from orchestrator.studies.screening.record import ItemRecord
@@ -112,7 +114,7 @@ def _out(summary: Summary, items: Sequence[ScreenedItem]) -> _Property | None:
     names = {item.outage.name for item in items}
     if len(names) == 1:
         (name,) = names
-        text = f"with {name} out" if items[0].outage.elements else "of the intact network"
+        text = _without(items[0].outage) if items[0].outage.elements else "of the intact network"
         return _Property(text, lambda item: item.outage.name == name)
     for kind, known in (
         ("unit", set(elements.units)),
@@ -121,6 +123,13 @@ def _out(summary: Summary, items: Sequence[ScreenedItem]) -> _Property | None:
         if all(known & set(item.outage.elements) for item in items):
             return _Property(f"with a {kind} out", _takes(known))
     return None
+
+
+def _without(outage: Outage) -> str:
+    """Return in words what is missing: ``with line_1_2 out``, ``with line_1_2 open at bus_1``."""
+    (only, *others) = outage.elements
+    end = None if others else LineEnd.of(only)
+    return f"with {outage.name} out" if end is None else f"with {end.line} open at {end.bus}"
 
 
 def _takes(known: set[str]) -> Callable[[ScreenedItem], bool]:

@@ -26,8 +26,8 @@ def converter(prepared: PreparedScenario, rating: float, controller: str | None)
     """The catalogue's grid-forming converter of a rating [MVA], of the kind that the network takes; one of its PODs is
     going to be tuned."""
     grid = prepared.case.table.power_flow
-    taken = prepared.system.components[grid.grid].description.inputs if grid else ()
-    model = "gfor_phasor" if any(name.endswith(".e_re") for name in taken) else "gfor"
+    is_phasor = grid is not None and prepared.system.components[grid.grid].is_of_phasors
+    model = "gfor_phasor" if is_phasor else "gfor"
     stages = {f"{controller}.N_S": STAGES} if controller else {}
     return ComponentTable(model=model, parameters={"S_n": rating, "P_0": 0.0, "Q_0": 0.0, **stages})
 

@@ -29,6 +29,7 @@ from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.linear.spectra.modes import damping_percent
 from orchestrator.studies.modes.modes import running
 from orchestrator.studies.operating_points.item import Item
+from orchestrator.studies.operating_points.line_ends import lines_with_ends
 from orchestrator.studies.operating_points.outages import INTACT, read_outages
 from orchestrator.studies.operating_points.preparation import ItemPreparation, failure
 from orchestrator.studies.points.request import OfCase, of_frequencies, of_scenario, of_values
@@ -219,6 +220,10 @@ def find_sites(
     preparation = ItemPreparation(open_case, scenario, request.layers, request.step_size)
     buses = candidates(request.buses, preparation.base)
     outages = read_outages(cast("str | None", request.outages), preparation.elements)
+    opening = lines_with_ends(element for outage in outages for element in outage.elements)
+    if opening:
+        open_case = replace(open_case, line_ends=opening)
+        preparation = ItemPreparation(open_case, scenario, request.layers, request.step_size)
     total = len(outages) + request.confirm
     situations, not_judged = [], dict[str, str]()
     for k, outage in enumerate(outages):

@@ -68,6 +68,11 @@ class ComponentPlan:
         """The model's declaration; a device's port without one is a converter's."""
         return self.description.kind or ("converter" if self.has_port else "")
 
+    @property
+    def is_of_phasors(self) -> bool:
+        """Return whether it is a network that devices give emfs to: one of phasors."""
+        return any(name.endswith(".e_re") for name in self.description.inputs)
+
     def value(self, name: str) -> Scalar | None:
         """The value of a parameter or an input, else its start value; None without both."""
         info = self.description.variables.get(name)

@@ -120,11 +120,6 @@ def test_a_run_that_cannot_be_is_an_item_that_is_not_judged(screened, monkeypatc
     assert found.stable is None
 
 
-def test_an_outage_of_one_end_names_what_takes_it(screened):
-    with pytest.raises(InputError, match=r"column grid\.line_1_2\.from_connected"):
-        screened([], ["line_1_2 at bus_2"])
-
-
 def test_a_clearing_time_without_runs_is_refused(screened):
     with pytest.raises(InputError, match="trips"):
         screened([], ["line_1_2"], trips=None, cleared_after="100 ms")
