@@ -12,8 +12,9 @@ from orchestrator.cases.form.parameter_files import ParameterFile
 from orchestrator.cases.form.schema import CaseTable, ComponentTable, EventTable, ScenarioTable
 from orchestrator.cases.networks.data import NetworkData
 from orchestrator.cases.networks.measured_point import MeasuredPoint
+from orchestrator.cases.networks.psse.load_relay_records import LoadRelay
 from orchestrator.cases.networks.psse.plant_controllers import PlantController, UnitOfPlant
-from orchestrator.cases.networks.psse.relay_records import LoadRelay, UnitRelay
+from orchestrator.cases.networks.psse.relay_records import UnitRelay
 from orchestrator.cases.networks.record_use import RecordUse
 from orchestrator.core.errors import (
     MOST_PROBLEMS,

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from fmus.grid.network import Line
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.flow.power_flow import PowerFlow
 from orchestrator.cases.form.remedies import without_models
@@ -89,16 +90,21 @@ def find_point(draft: Draft, point: MeasuredPoint, own_bus: str, record: str) ->
         )
     if not point.near:
         return FoundPoint(bus)
-    ends = tuple(bus_name(str(number)) for number in (point.near, point.far))
-    names = draft.data.branch_names if draft.data else {}
-    between = [line for line in draft.network.lines if {line.from_bus, line.to_bus} == {*ends}]
-    of_circuit = [
-        line for line in between if line.name in names and names[line.name].circuit == point.circuit
-    ]
-    chosen = of_circuit or (between if len(between) == 1 else [])
-    if not chosen:
+    line = line_of_numbers(draft, point.near, point.far, point.circuit)
+    if line is None:
         raise InputError(
             f"{record} measures the branch {point.near}-{point.far}, circuit {point.circuit!r}, which is no line or "
             f"transformer of two windings of the network; {remedy}"
         )
-    return FoundPoint(bus, chosen[0].name, is_far=chosen[0].from_bus != ends[0])
+    return FoundPoint(bus, line.name, is_far=line.from_bus != bus_name(str(point.near)))
+
+
+def line_of_numbers(draft: Draft, near: int, far: int, circuit: str) -> Line | None:
+    """Return the branch between buses of the file, by their numbers; None where there is none, or no sole one."""
+    ends = {bus_name(str(number)) for number in (near, far)}
+    names = draft.data.branch_names if draft.data else {}
+    lines = draft.network.lines if draft.network else ()
+    between = [line for line in lines if {line.from_bus, line.to_bus} == ends]
+    of_circuit = [x for x in between if x.name in names and names[x.name].circuit == circuit]
+    chosen = of_circuit or (between if len(between) == 1 else [])
+    return chosen[0] if chosen else None

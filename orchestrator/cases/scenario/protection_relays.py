@@ -9,14 +9,16 @@ from orchestrator.cases.draft import Draft
 from orchestrator.cases.flow.power_flow import PowerFlow
 from orchestrator.cases.networks.data import bus_name
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
-from orchestrator.cases.networks.psse.raw_network import unit_labels
-from orchestrator.cases.networks.psse.relay_records import (
+from orchestrator.cases.networks.psse.load_relay_records import (
     LoadRelay,
-    UnitRelay,
+    TransferTrip,
+    is_of,
     load_relays,
-    unit_relays,
 )
+from orchestrator.cases.networks.psse.raw_network import unit_labels
+from orchestrator.cases.networks.psse.relay_records import UnitRelay, unit_relays
 from orchestrator.cases.networks.step_ups import own_branches
+from orchestrator.cases.scenario.measured_points import line_of_numbers
 from orchestrator.core.errors import InputError, Problem, QuestionTopic, few
 from orchestrator.core.options import Option
 from orchestrator.systems.coupling.events import Event, LineSwitching, UnitSwitching
@@ -116,22 +118,22 @@ def relays_of(draft: Draft, flow: PowerFlow | None) -> tuple[Relay, ...]:
             found.append(relay)
             _ask(draft, relay, flow, unit.record)
     for stage in draft.load_relays:
-        shed = _shedding(draft, grid, stage)
-        if shed is not None:
+        ordered = _orders_of_stage(draft, grid, stage)
+        if ordered:
             relay = Relay(
                 stage.record.name,
-                stage.load.load,
+                _protected(ordered) if stage.transfer else stage.load.load,
                 grid,
                 bus_name(str(stage.watched)),
                 stage.quantity,
                 stage.limits,
-                orders=(shed,),
+                orders=ordered,
                 f_n=f_n,
             )
             found.append(relay)
             _ask(draft, relay, flow, stage.record)
-    ordered = (order for relay in found for order in relay.orders)
-    protected = {order.unit for order in ordered if isinstance(order, UnitSwitching)}
+    all_orders = (order for relay in found for order in relay.orders)
+    protected = {order.unit for order in all_orders if isinstance(order, UnitSwitching)}
     return (*found, *_by_code(draft, grid, f_n, protected, flow))
 
 
@@ -227,6 +229,55 @@ def _bus_off(draft: Draft, grid: str, bus: str) -> Iterator[Event]:
             yield LineSwitching(0.0, grid, line.name, False)
 
 
+def _orders_of_stage(draft: Draft, grid: str, stage: LoadRelay) -> tuple[Event | Shedding, ...]:
+    """Return what a stage orders: that its load is shed, or what it takes off besides."""
+    if stage.transfer is not None:
+        return _transferred(draft, grid, stage, stage.transfer)
+    shed = _shedding(draft, grid, stage)
+    return () if shed is None else (shed,)
+
+
+def _protected(orders: Sequence[Event | Shedding]) -> str:
+    """Return the units or lines that orders take off."""
+    units = [order.unit for order in orders if isinstance(order, UnitSwitching)]
+    return ", ".join(units + [x.line for x in orders if isinstance(x, LineSwitching)])
+
+
+def _transferred(
+    draft: Draft, grid: str, stage: LoadRelay, transfer: TransferTrip
+) -> tuple[Event, ...]:
+    found: list[Event] = []
+    labels = unit_labels(draft.data.machines) if draft.data else {}
+    for machine, label in labels.items():
+        if is_of(transfer, machine):
+            names = (f"{kind}{label}" for kind in _UNIT_KINDS)
+            found += [_unit_off(draft, grid, x) for x in names if x in draft.system.components]
+    if transfer.branch is not None:
+        line = line_of_numbers(draft, *transfer.branch)
+        if line is not None:
+            found.append(LineSwitching(0.0, grid, line.name, False))
+    if not found:
+        _ask_transfer(draft, stage.record, transfer)
+    return tuple(found)
+
+
+def _ask_transfer(draft: Draft, record: DynamicRecord, transfer: TransferTrip) -> None:
+    """Ask about what a relay would take off besides, once for each record."""
+    what = "a branch"
+    if transfer.machine is not None:
+        bus, name = transfer.machine
+        what = f"the machine {name!r} at bus {bus}"
+    elif transfer.branch is not None:
+        one, other, circuit = transfer.branch
+        what = f"the branch {one}-{other}, circuit {circuit!r}"
+    text = f"{record.name} sheds its load and takes nothing off besides: {what} is not here; correct it"
+    asked = Problem(
+        record.place, text, topic=QuestionTopic("a relay of nothing in the network", record.name)
+    )
+    if asked not in draft.found.questions:
+        draft.found.questions.append(asked)
+
+
 def _may_be_zero(draft: Draft, grid: str, load: str) -> bool:
     scale = draft.system.components[grid].description.variables.get(f"{load}.scale")
     return scale is not None and not scale.minimum
@@ -234,10 +285,10 @@ def _may_be_zero(draft: Draft, grid: str, load: str) -> bool:
 
 def _shedding(draft: Draft, grid: str, stage: LoadRelay) -> Shedding | None:
     """Return what a stage takes off; nothing of a load that the grid cannot be without."""
-    load = next(
-        (x for x in (draft.network.loads if draft.network else ()) if x.name == stage.load.load),
-        None,
-    )
+    network = draft.network
+    if network is None:
+        return None
+    load = next((x for x in network.loads if x.name == stage.load.load), None)
     if load is None or not load.p_mw > 0:
         return None
     if not _may_be_zero(draft, grid, load.name):
@@ -248,8 +299,21 @@ def _shedding(draft: Draft, grid: str, stage: LoadRelay) -> Shedding | None:
         topic = QuestionTopic("a relay that cannot shed its load", load.name)
         draft.found.questions.append(Problem(stage.record.place, text, topic=topic))
         return None
+    if stage.sheds_shunts and any(x.bus == load.bus for x in network.shunts):
+        _ask_shunts(draft, stage.record, load.bus)
     part = stage.load.drawn.real / load.p_mw
     return Shedding(grid, load.name, min(1.0, part * stage.share))
+
+
+def _ask_shunts(draft: Draft, record: DynamicRecord, bus: str) -> None:
+    text = (
+        f"{record.name} sheds a share of the shunts at {bus} with the load, and here they stay; write 0 for its flag "
+        "if that is meant, or open them by an event"
+    )
+    topic = QuestionTopic("a relay that sheds shunts", record.name)
+    asked = Problem(record.place, text, topic=topic)
+    if asked not in draft.found.questions:
+        draft.found.questions.append(asked)
 
 
 def _ask(draft: Draft, relay: Relay, flow: PowerFlow | None, record: DynamicRecord) -> None:

@@ -4,7 +4,7 @@ The relays look at their buses at regular times. A relay picks up when it sees i
 that when it sees it within again. If it was beyond for the relay's delay, the relay trips: it orders its events, which
 happen when the breaker has opened. Nothing takes an order back."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import exp, inf, pi
 from typing import Any
@@ -13,7 +13,7 @@ import numpy as np
 
 from orchestrator.core.arrays import Numbers
 from orchestrator.devices.fmi.component import RealBatch
-from orchestrator.systems.coupling.events import Event, LoadChange, UnitSwitching
+from orchestrator.systems.coupling.events import Event, LineSwitching, LoadChange, UnitSwitching
 from orchestrator.systems.coupling.observers import ObservedRun
 from orchestrator.systems.coupling.relay_limits import Quantity, RelayLimits
 
@@ -196,16 +196,17 @@ class Relays:
         return found
 
     def _events_of(self, k: int, before: Sequence[Trip]) -> tuple[Event, ...]:
-        """Return the events of a relay without those of units that are off already."""
+        """Return the events of a relay without those of units that are off and of lines that are open already."""
         time, scale = self._state[k, [_OPENED, _SCALE]].tolist()
         off = {e.unit for trip in before for e in trip.events if isinstance(e, UnitSwitching)}
         on = {e.unit: e.connected for e in self._switchings if e.time <= time}
         off.update(unit for unit, connected in on.items() if not connected)
+        opened = {e.line for trip in before for e in trip.events if isinstance(e, LineSwitching)}
         found: list[Event] = []
         for order in self.relays[k].orders:
             if isinstance(order, Shedding):
                 found.append(LoadChange(time, order.component, order.load, scale))
-            elif not (isinstance(order, UnitSwitching) and order.unit in off):
+            elif not _is_done(order, off, opened):
                 found.append(replace(order, time=time))
         return tuple(found)
 
@@ -224,6 +225,13 @@ class Relays:
         self._looked = float(position["looked"])
         for k, begin, end in position["spans"].tolist():
             self._spans[int(k)].append([begin, end])
+
+
+def _is_done(order: Event, off: Collection[str], opened: Collection[str]) -> bool:
+    """Return whether a unit is off already, or a line open."""
+    if isinstance(order, UnitSwitching):
+        return order.unit in off
+    return isinstance(order, LineSwitching) and order.line in opened
 
 
 def _follow_angles(state: Any, angle: Numbers, elapsed: float, has_angle: Numbers) -> Numbers:

@@ -115,6 +115,37 @@ def test_stages_shed_parts_of_the_load_that_they_name(prepared):
     assert of_first.startswith("30 % of load_2 is shed, which leaves 70 %, at t = 1.07 s by LVSHBL")
 
 
+def test_a_relay_of_a_load_takes_a_plant_off_as_soon_as_a_stage_has_waited(prepared):
+    """Two stages order the same plant off: it goes once, its breaker's time after the first."""
+    record = (
+        "2 'LVS3BL' 1 1 2 '1' 0 0 '0' 0 0.8 0.05 0.07 0.4 0.8 0.06 0.02 0.3" + " 0" * 12 + " 0.03 0"
+    )
+    result = run_scenario(prepared([record], [fault(1.0, 0.15)]))
+    told = [(trip.relay.of, trip.time) for trip in result.trips]
+    assert told == [
+        ("line_1_2", pytest.approx(1.08, abs=1e-9)),
+        ("load_2", pytest.approx(1.08, abs=1e-9)),
+        ("load_2", pytest.approx(1.12, abs=1e-9)),
+    ]
+    after = result.dataset["grid.line_1_2.p"].sel(time=slice(1.09, None))
+    assert np.abs(after).max() == 0
+    slow = "2 'LDS3BL' 1 2 '-1' 0 59.3 0.1 0.05 1.0" + " 0" * 16 + " 0.2"
+    trips = run_scenario(prepared([slow], [OPENING])).trips
+    assert [trip.relay.of for trip in trips] == ["load_2", "sg2"]
+    assert trips[1].time - trips[0].time == pytest.approx(0.15, abs=1e-9)
+
+
+def test_what_a_relay_would_take_off_and_is_not_there_is_asked_about_once(prepared):
+    record = (
+        "2 'LVS3BL' 1 1 2 '7' 2 9 '1' 0 0.8 0.05 0.07 0.4 0.8 0.06 0.02 0.3" + " 0" * 12 + " 0 0"
+    )
+    asked = [
+        question.text for question in prepared([record]).questions if "LVS3BL" in question.text
+    ]
+    (only,) = asked
+    assert "takes nothing off besides: the branch 2-9, circuit '1' is not here; correct it" in only
+
+
 def test_a_share_comes_off_what_an_event_left_of_the_load(prepared):
     change = {"type": "load_change", "load": "load_2", "scale": 0.5, "time": 0.5}
     record = "2 'LVSHBL' 1 0.8 0.05 0.4 0 0 0 0 0 0 0"

@@ -20,8 +20,9 @@ from orchestrator.cases.networks.psse.dyr_file import NUMBERED
 from orchestrator.cases.networks.psse.frequency_records import FREQUENCY_RECORDS
 from orchestrator.cases.networks.psse.limiter_records import LIMITERS
 from orchestrator.cases.networks.psse.load_records import LOAD_RECORDS
+from orchestrator.cases.networks.psse.load_relay_records import LOAD_RELAYS
 from orchestrator.cases.networks.psse.motor_loads import MOTOR_NAMES
-from orchestrator.cases.networks.psse.relay_records import LOAD_RELAYS, OF_BUSES
+from orchestrator.cases.networks.psse.relay_records import OF_BUSES
 
 _LIBRARY = "PSS/E's model library as PowerWorld's and NEPLAN's guides and ANDES' reader describe it"
 _COMPENSATORS = "PowerWorld's guide to PSS/E's models; CSVGN5 and SVSMO1 as InterPSS reads them"
@@ -122,8 +123,8 @@ def known_records() -> list[KnownRecord]:
     ]
     found += [
         KnownRecord(name, "relay", "load_change", _RELAYS, _NOT_SHED)
-        for names in LOAD_RELAYS.values()
-        for name in names
+        for form in LOAD_RELAYS
+        for name in form.names
     ]
     by_name = _peers()
     return [replace(r, held_against=by_name.get(r.name, _BY_HAND)) for r in found]

@@ -5,8 +5,9 @@ from math import inf
 import pytest
 
 from orchestrator.cases.networks.psse.dyr_file import read_dyr
+from orchestrator.cases.networks.psse.load_relay_records import load_relays
 from orchestrator.cases.networks.psse.raw_network import FileLoad
-from orchestrator.cases.networks.psse.relay_records import load_relays, unit_relays
+from orchestrator.cases.networks.psse.relay_records import unit_relays
 from orchestrator.core.errors import InputError
 from orchestrator.systems.coupling.relay_limits import RelayLimits
 
@@ -64,6 +65,34 @@ def test_each_stage_of_a_load_relay_is_one_and_an_empty_one_is_none(tmp_path):
     assert own.watched == 1
     (slow,) = stages(tmp_path, "2 'LDSHBL' 1 59.3 0.2 0.3 0 0 0 0 0 0 0.1")
     assert (slow.quantity, slow.limits.low, slow.share) == ("frequency", 59.3, 0.3)
+
+
+FIVE = "59.47 0.031 0.019 0.23 58.5 0.1 0.02 0.3 0 0 0 0 0 0 0 0 0 0 0 0"
+
+
+def test_five_stages_have_breakers_of_their_own_and_take_a_machine_off(tmp_path):
+    """Whole values as InterPSS's test of PSS/E's own relay has them: bus and identifier, and if shunts go as well."""
+    found = stages(tmp_path, f"1 'LDS3BL' 1 3 'G1' 1 {FIVE} 0.023")
+    first, second = (one for one in found if one.transfer is None)
+    assert (first.share, first.limits) == (0.23, RelayLimits(59.47, inf, 0.031, 0.019))
+    assert (second.share, second.limits) == (0.3, RelayLimits(58.5, inf, 0.1, 0.02))
+    assert first.sheds_shunts
+    assert first.quantity == "frequency"
+    transfers = [(one.transfer.machine, one.limits) for one in found if one.transfer]
+    assert transfers == [
+        ((3, "G1"), RelayLimits(59.47, inf, 0.031, 0.023)),
+        ((3, "G1"), RelayLimits(58.5, inf, 0.1, 0.023)),
+    ]
+    only = stages(tmp_path, f"1 'LDS3BL' 1 0 '0' 0 {FIVE} 0.023")
+    assert [one.transfer for one in only] == [None, None]
+
+
+def test_five_stages_of_voltage_open_two_branches(tmp_path):
+    found = stages(tmp_path, f"1 'LVS3BL' 1 1 2 '1' 0 0 '0' 0 {FIVE} 0.021 0.03")
+    branches = [(one.transfer.branch, one.limits.opening) for one in found if one.transfer]
+    assert branches == [((1, 2, "1"), 0.021)] * 2
+    with pytest.raises(InputError, match="has 25 values, and needs 29: two branches"):
+        stages(tmp_path, f"1 'LVS3BL' 1 0 0 '0' {FIVE} 0.021 0.03")
 
 
 def test_the_narrower_record_counts_and_what_feeds_sheds_nothing(tmp_path):
