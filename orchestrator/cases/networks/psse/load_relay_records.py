@@ -85,7 +85,7 @@ LOAD_RELAYS = (
 
 @dataclass(frozen=True)
 class TransferTrip:
-    """What a relay of a load takes off besides: a machine by bus and identifier, ``"-1"`` for all of the bus, or a
+    """A part that a relay of a load takes off besides: a machine by bus and identifier, ``"-1"`` for all of the bus, or a
     branch by its buses and circuit."""
 
     machine: tuple[int, str] | None = None
