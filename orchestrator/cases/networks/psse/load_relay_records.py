@@ -85,8 +85,8 @@ LOAD_RELAYS = (
 
 @dataclass(frozen=True)
 class TransferTrip:
-    """A part that a relay of a load takes off besides: a machine by bus and identifier, ``"-1"`` for all of the bus, or a
-    branch by its buses and circuit."""
+    """A part that a relay of a load takes off besides: a machine by bus and identifier, ``"-1"`` for all of the bus,
+    or a branch by its buses and circuit."""
 
     machine: tuple[int, str] | None = None
     branch: tuple[int, int, str] | None = None
