@@ -66,6 +66,12 @@ _CASES = {
 }
 """Room of the cases → the modules that stood beside it; ``former=present`` where the name changed as well."""
 
+_RENAMED = {
+    "output.report.table": "output.report.column_table",
+    "output.report.tables": "output.report.terminal_tables",
+}
+"""Modules on the floors that had another name there."""
+
 _HERE = __package__
 
 
@@ -75,6 +81,8 @@ def present_name(name: str) -> str | None:
     room, _, inside = rest.partition(".")
     if top != _HERE:
         return None
+    if rest in _RENAMED:
+        return f"{_HERE}.{_RENAMED[rest]}"
     if room in _PARTED and not inside:
         return name
     if room in _PARTED:
@@ -83,7 +91,10 @@ def present_name(name: str) -> str | None:
     if room == "cases":
         return _present_case_module(inside)
     floors = [floor for floor, rooms in _ROOMS.items() if room in rooms.split()]
-    return f"{_HERE}.{floors[0]}.{rest}" if floors else None
+    if not floors:
+        return None
+    inside_floor = f"{floors[0]}.{rest}"
+    return f"{_HERE}.{_RENAMED.get(inside_floor, inside_floor)}"
 
 
 def _present_case_module(inside: str) -> str | None:

@@ -276,7 +276,7 @@ FOR_TYPES = {
     "studies.oscillations.signs",
     "studies.oscillations.view",
     "output.report.plot_style",
-    "output.report.tables",
+    "output.report.fmu_variables",
     "output.results.recording",
     "output.results.storage",
 }

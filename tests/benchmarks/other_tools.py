@@ -11,7 +11,7 @@ from rich.markup import escape
 
 from orchestrator.core.errors import CosimError
 from orchestrator.devices.fmi.description import read_declared
-from orchestrator.output.report.tables import make_table
+from orchestrator.output.report.terminal_tables import make_table
 
 _PATIENCE = 300
 """Longest time for the checks of one FMU [s]."""

@@ -25,6 +25,8 @@ FORMER = {
     "orchestrator.cases.short_circuit": "orchestrator.cases.scenario.short_circuit",
     "orchestrator.cases.network_data": "orchestrator.cases.networks.data",
     "orchestrator.cases.psse.raw": "orchestrator.cases.networks.psse.raw",
+    "orchestrator.output.report.table": "orchestrator.output.report.column_table",
+    "orchestrator.report.table": "orchestrator.output.report.column_table",
 }
 
 

@@ -16,7 +16,7 @@ from orchestrator.face.cli.by_point import by_point
 from orchestrator.face.cli.case_arguments import add_excitation_arguments, excitation_of
 from orchestrator.face.cli.terminal import make_console, print_json, said_stages
 from orchestrator.linear.spectra.modes import damping_percent
-from orchestrator.output.report.tables import make_table
+from orchestrator.output.report.terminal_tables import make_table
 from orchestrator.output.results.storage import save_table
 from orchestrator.studies.immittance.forms import FORMS, rows_in
 from orchestrator.studies.immittance.measured import as_scan

@@ -13,7 +13,7 @@ from orchestrator.face.cli.terminal import make_console, print_json, said_stages
 from orchestrator.face.cli.verdict import exit_code, print_stability
 from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ, Mode
 from orchestrator.linear.spectra.stability import Stability, judge
-from orchestrator.output.report.tables import make_table
+from orchestrator.output.report.terminal_tables import make_table
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.output.results.staging import new_run_id, staged
 from orchestrator.studies.black_box.coupled_modes import (

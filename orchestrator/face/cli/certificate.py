@@ -27,7 +27,8 @@ from orchestrator.face.cli.terminal import (
     said_stages,
 )
 from orchestrator.linear.spectra.modes import damping_ratio
-from orchestrator.output.report.tables import PlainTable, make_table, short
+from orchestrator.output.report.short_texts import short
+from orchestrator.output.report.terminal_tables import PlainTable, make_table
 from orchestrator.output.results.lock import hold_folder
 from orchestrator.output.signatures.signing import check_key
 from orchestrator.simulation.watch.finding import MISFIT

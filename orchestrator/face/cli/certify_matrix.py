@@ -23,7 +23,7 @@ from orchestrator.face.cli.certificate import (
 from orchestrator.face.cli.certify_frequency import measured_behaviour
 from orchestrator.face.cli.certify_sensitivities import find_needs
 from orchestrator.face.cli.terminal import make_console, make_errors, print_json
-from orchestrator.output.report.tables import PlainTable, make_table
+from orchestrator.output.report.terminal_tables import PlainTable, make_table
 from orchestrator.output.results.lock import hold_folder
 from orchestrator.studies.certification.acceptance import KEPT
 from orchestrator.studies.certification.certificate import Certificate

@@ -15,7 +15,7 @@ from orchestrator.face.cli.terminal import (
     saying_warnings,
 )
 from orchestrator.linear.signals.identification import IdentifiedMode
-from orchestrator.output.report.tables import make_table
+from orchestrator.output.report.terminal_tables import make_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -16,7 +16,7 @@ from orchestrator.face.cli.terminal import (
     saying_warnings,
 )
 from orchestrator.output.report.mode_tables import eigenvalue_text
-from orchestrator.output.report.tables import make_table
+from orchestrator.output.report.terminal_tables import make_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

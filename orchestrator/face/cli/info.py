@@ -11,7 +11,7 @@ from orchestrator.face.api.dll import KEPT_IN
 from orchestrator.face.api.fmu import info
 from orchestrator.face.cli.arguments import add_options
 from orchestrator.face.cli.terminal import make_console, print_json
-from orchestrator.output.report.tables import fmu_variables
+from orchestrator.output.report.fmu_variables import fmu_variables
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

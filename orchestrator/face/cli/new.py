@@ -20,7 +20,8 @@ from orchestrator.core.safe_files import write_text
 from orchestrator.devices.fmi.vendor_files import is_vendor_file
 from orchestrator.face.cli.arguments import add_options
 from orchestrator.face.cli.terminal import make_console, print_json, print_parts
-from orchestrator.output.report.tables import PlainTable, first_few, make_table
+from orchestrator.output.report.short_texts import first_few
+from orchestrator.output.report.terminal_tables import PlainTable, make_table
 
 _EXAMPLE = 'gfor new own.raw own.dyr --converter "bus 9, 300 MVA, 200 MW, less sg3" --out case.toml'
 

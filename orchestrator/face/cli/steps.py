@@ -10,7 +10,7 @@ from orchestrator.face.cli.arguments import add_json_argument, add_request_argum
 from orchestrator.face.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.face.cli.terminal import make_console, print_json
 from orchestrator.linear.spectra.modes import damping_percent
-from orchestrator.output.report.tables import PlainTable, make_table
+from orchestrator.output.report.terminal_tables import PlainTable, make_table
 from orchestrator.studies.modes.request import StepsRequest
 from orchestrator.studies.modes.step_choice import Allowed, StepChoice, TriedStep, step_choice_json
 from orchestrator.systems.coupling.schedule import ScheduleName

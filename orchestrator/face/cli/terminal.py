@@ -19,9 +19,9 @@ from orchestrator.core.question_kinds import by_kind
 from orchestrator.core.safe_files import made_folder
 from orchestrator.face.cli.known_questions import new_questions
 from orchestrator.face.cli.later import say_last
+from orchestrator.output.report.column_table import ColumnTable, ShownTable
 from orchestrator.output.report.linearised import exceptions_in_words
-from orchestrator.output.report.table import ColumnTable, ShownTable
-from orchestrator.output.report.tables import PlainTable
+from orchestrator.output.report.terminal_tables import PlainTable
 from orchestrator.output.results.manifest import ResultsWarning
 from orchestrator.output.results.staging import new_run_id, staged
 from orchestrator.output.results.storage import save_json

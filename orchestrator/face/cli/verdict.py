@@ -10,7 +10,8 @@ from orchestrator.face.cli.arguments import switch
 from orchestrator.face.cli.terminal import print_parts
 from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ
 from orchestrator.linear.spectra.stability import Stability
-from orchestrator.output.report.tables import COLOURS, VerdictSentence
+from orchestrator.output.report.colours import OF_VERDICTS
+from orchestrator.output.report.verdict_sentence import VerdictSentence
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.runs import tables
 from orchestrator.studies.runs.answer import ScenarioAnswer
@@ -49,7 +50,8 @@ def _headline(verdicts: Mapping[str, Stability]) -> str:
     for wanted, text in ((False, "UNSTABLE"), (None, "stability not known")):
         found = [title for title, verdict in verdicts.items() if verdict.stable is wanted]
         if found:
-            return f"[bold {COLOURS[wanted]}]{text}[/]: {escape(', '.join(found))} ({len(found)} of {len(verdicts)})"
+            colour = OF_VERDICTS[wanted]
+            return f"[bold {colour}]{text}[/]: {escape(', '.join(found))} ({len(found)} of {len(verdicts)})"
     return f"[bold green]stable[/]: all {len(verdicts)}"
 
 

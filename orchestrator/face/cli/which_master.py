@@ -13,7 +13,7 @@ from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import made_folder, write_text
 from orchestrator.face.cli.arguments import add_options
 from orchestrator.face.cli.terminal import make_console, print_json
-from orchestrator.output.report.tables import PlainTable
+from orchestrator.output.report.terminal_tables import PlainTable
 from orchestrator.simulation.interop.probe_result import Candidate, read_probe_result
 from orchestrator.simulation.interop.which_master import (
     PROPERTIES,

@@ -5,7 +5,7 @@ The tables are over the JSON of scenarios: a terminal shows them of what was com
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
-from orchestrator.output.report.table import Column, Marked, ShownCell, ShownTable
+from orchestrator.output.report.column_table import Column, Marked, ShownCell, ShownTable
 
 Content = Mapping[str, Any]
 """The JSON of a scenario, or a part of it."""

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.core.safe_files import write_bytes
-from orchestrator.output.report.html import elements
+from orchestrator.output.report.colours import GRID_LINES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 STYLE: dict[Any, Any] = {
     "axes.grid": True,
-    "grid.color": "#e3e3e3",
+    "grid.color": GRID_LINES,
     "grid.linewidth": 0.6,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -24,7 +24,6 @@ STYLE: dict[Any, Any] = {
     "legend.frameon": False,
     "lines.linewidth": 1.3,
 }
-colour = elements.colour
 _DPI = 150
 _LEGEND_WIDTH = 96  # characters that fit in a line of a legend, marks included
 

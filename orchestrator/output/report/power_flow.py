@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from orchestrator.output.report.table import ShownTable
+from orchestrator.output.report.column_table import ShownTable
 
 COLUMNS = {
     "machines": {

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from orchestrator.output.report.table import ShownTable
+from orchestrator.output.report.column_table import ShownTable
 
 _FORMATS = {"s_sc_mva": ".0f", "scr": ".2f", "rating_mva": ".5g", "x_r": ".1f"}
 """How the figures of a bus are written."""

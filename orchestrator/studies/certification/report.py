@@ -10,7 +10,7 @@ from orchestrator.devices.fmi.archive import read_origin
 from orchestrator.devices.fmi.port import BoundDescription
 from orchestrator.devices.fmi.values import Scalar, as_text
 from orchestrator.output.report.html.elements import SHADES, Figures, bullet_list, document, table
-from orchestrator.output.report.tables import short
+from orchestrator.output.report.short_texts import short
 from orchestrator.studies.certification.case_file import BINDING, FMU, WITH
 from orchestrator.studies.certification.certificate import Certificate, DampingCertificate
 from orchestrator.studies.certification.codes.record import row_chapters

@@ -7,6 +7,7 @@ import numpy as np
 
 from orchestrator.linear.models.linear_model import PACKED
 from orchestrator.linear.spectra.modes import damping_ratio
+from orchestrator.output.report.colours import colour
 from orchestrator.output.report.html.charts import (
     ChartCurve,
     Mark,
@@ -14,14 +15,7 @@ from orchestrator.output.report.html.charts import (
     legend,
     line_chart,
 )
-from orchestrator.output.report.html.elements import (
-    Figures,
-    colour,
-    damping,
-    eigenvalue,
-    number,
-    table,
-)
+from orchestrator.output.report.html.elements import Figures, damping, eigenvalue, number, table
 from orchestrator.output.report.linearised import exceptions_in_words
 from orchestrator.studies.certification.case_file import WITH, WITHOUT
 from orchestrator.studies.certification.certificate import Certificate, DampingCertificate

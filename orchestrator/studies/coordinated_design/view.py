@@ -11,9 +11,9 @@ from orchestrator.cases.form.parameter_files import parameter_file_text
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import write_text
 from orchestrator.core.truth import NoTruth
+from orchestrator.output.report.column_table import Column, ColumnTable
 from orchestrator.output.report.notebook import page
-from orchestrator.output.report.table import Column, ColumnTable
-from orchestrator.output.report.tables import PlainTable, make_table
+from orchestrator.output.report.terminal_tables import PlainTable, make_table
 from orchestrator.output.results.manifest import made_now
 from orchestrator.output.results.storage import save_json
 from orchestrator.studies.coordinated_design.search import RankedConverter

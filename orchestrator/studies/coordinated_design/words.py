@@ -4,7 +4,8 @@ from collections import Counter
 
 from orchestrator.core.errors import few
 from orchestrator.linear.spectra.stability import zeros_in_words
-from orchestrator.output.report.tables import VerdictSentence, kinds_of
+from orchestrator.output.report.short_texts import kinds_of
+from orchestrator.output.report.verdict_sentence import VerdictSentence
 from orchestrator.studies.coordinated_design.objective import APART
 from orchestrator.studies.coordinated_design.study import PointsDesign
 from orchestrator.studies.coordinated_design.verdict import MORE, PointsVerdict

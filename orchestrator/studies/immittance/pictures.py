@@ -7,7 +7,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestrator.output.report.plot_style import STYLE, add_legend, colour, save_figure
+from orchestrator.output.report.colours import colour
+from orchestrator.output.report.plot_style import STYLE, add_legend, save_figure
 from orchestrator.studies.immittance.judgement import CutJudgement
 from orchestrator.studies.immittance.retune import Retuned
 from orchestrator.studies.immittance.sides import short_name

@@ -10,12 +10,12 @@ from typing import Any, TypeVar
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder, write_text
 from orchestrator.core.truth import NoTruth
+from orchestrator.output.report.column_table import Column, ColumnTable
 from orchestrator.output.report.explorer_cells import CELLS, Cell, CellLine, Cells
 from orchestrator.output.report.html.elements import Figures, document, paragraphs
 from orchestrator.output.report.mode_tables import mode_columns, verdict
 from orchestrator.output.report.notebook import page
-from orchestrator.output.report.table import Column, ColumnTable
-from orchestrator.output.report.tables import first_few
+from orchestrator.output.report.short_texts import first_few
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.output.results.staging import new_run_id, staged
 from orchestrator.output.results.storage import save_json, save_table

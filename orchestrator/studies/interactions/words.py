@@ -1,6 +1,6 @@
 """Sentences of a study of interactions."""
 
-from orchestrator.output.report.tables import VerdictSentence
+from orchestrator.output.report.verdict_sentence import VerdictSentence
 from orchestrator.studies.interactions.judgement import (
     JudgedInteractions,
     JudgedSystem,

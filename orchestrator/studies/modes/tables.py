@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from orchestrator.linear.spectra.modes import Mode
+from orchestrator.output.report.column_table import Column, ColumnTable
 from orchestrator.output.report.mode_tables import damping, eigenvalue_text
-from orchestrator.output.report.table import Column, ColumnTable
 from orchestrator.studies.modes.modes import ModesResult
 
 WELL_DAMPED = 0.3

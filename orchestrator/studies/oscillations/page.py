@@ -6,8 +6,9 @@ from html import escape
 import numpy as np
 
 from orchestrator.core.errors import number_of
+from orchestrator.output.report.colours import colour
 from orchestrator.output.report.html.charts import ChartCurve, legend, line_chart
-from orchestrator.output.report.html.elements import SHADES, Figures, colour, document
+from orchestrator.output.report.html.elements import SHADES, Figures, document
 from orchestrator.output.report.html.network_map import network_map
 from orchestrator.studies.oscillations.detection import envelope, signals_of, spectra
 from orchestrator.studies.oscillations.location import works

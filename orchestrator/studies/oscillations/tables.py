@@ -1,6 +1,6 @@
 """The table of opinions on an oscillation that a terminal and a page show."""
 
-from orchestrator.output.report.table import ShownTable
+from orchestrator.output.report.column_table import ShownTable
 from orchestrator.studies.oscillations.verdict import Located
 
 _PLACES = 5

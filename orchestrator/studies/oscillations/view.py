@@ -11,7 +11,7 @@ from orchestrator.cases.form.given import Time, part_of_record
 from orchestrator.core.errors import CosimError
 from orchestrator.core.late import pd, xr
 from orchestrator.output.report.notebook import page
-from orchestrator.output.report.tables import PlainTable, make_table
+from orchestrator.output.report.terminal_tables import PlainTable, make_table
 from orchestrator.studies.oscillations.detection import SpectralLine
 from orchestrator.studies.oscillations.measurements import Measurements
 from orchestrator.studies.oscillations.reading import measurements_of

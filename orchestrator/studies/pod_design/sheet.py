@@ -9,7 +9,7 @@ from rich.table import Table
 from orchestrator.linear.spectra.modes import Mode, damping_ratio
 from orchestrator.linear.spectra.stability import Stability
 from orchestrator.output.report.mode_tables import eigenvalue_text
-from orchestrator.output.report.tables import make_table
+from orchestrator.output.report.terminal_tables import make_table
 from orchestrator.studies.pod_design.design import PodDesign
 from orchestrator.studies.pod_design.lead_lag import (
     LARGEST_STAGE_ANGLE,

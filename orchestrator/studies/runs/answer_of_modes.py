@@ -2,7 +2,7 @@
 
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.linear.spectra.stability import Cause
-from orchestrator.output.report.tables import first_few, short
+from orchestrator.output.report.short_texts import first_few, short
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.runs.answer import LONGEST_REMARK, ScenarioAnswer
 

@@ -8,7 +8,7 @@ from math import ceil
 from orchestrator.core.errors import RunInterruptedError, few
 from orchestrator.core.options import Option
 from orchestrator.linear.spectra.modes import Mode
-from orchestrator.output.report.tables import short
+from orchestrator.output.report.short_texts import short
 from orchestrator.simulation.watch.confirmation import PERIODS
 from orchestrator.simulation.watch.finding import TRIP
 from orchestrator.simulation.watch.own_trips import OWN_TRIPS

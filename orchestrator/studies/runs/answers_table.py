@@ -6,7 +6,9 @@ from rich.table import Table
 from rich.text import Text
 
 from orchestrator.linear.spectra.modes import Mode
-from orchestrator.output.report.tables import COLOURS, make_table, short
+from orchestrator.output.report.colours import OF_VERDICTS
+from orchestrator.output.report.short_texts import short
+from orchestrator.output.report.terminal_tables import make_table
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.runs.answer import LONGEST_REMARK, ScenarioAnswer
 
@@ -20,7 +22,7 @@ def answers_table(answers: Sequence[ScenarioAnswer], frequency_range: tuple[floa
         f"Least damped mode from {low:g} to {high:g} Hz{when}: who swings; remark", overflow="fold"
     )
     for answer in answers:
-        word = Text(answer.verdict, style=f"bold {COLOURS[answer.good]}")
+        word = Text(answer.verdict, style=f"bold {OF_VERDICTS[answer.good]}")
         figures = _figures([mode for mode in (answer.mode, answer.became) if mode])
         table.add_row(answer.subject, word, *figures, answer.remark)
         another = answer.another_after

@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 
 from orchestrator.cases.form.schema import PlotTable, ReferenceModeTable
 from orchestrator.linear.spectra.modes import Mode
-from orchestrator.output.report.plot_style import STYLE, add_legend, colour, save_figure
+from orchestrator.output.report.colours import colour
+from orchestrator.output.report.plot_style import STYLE, add_legend, save_figure
 from orchestrator.output.results.signals import outline, signal
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.runs.run import RunResult

@@ -8,9 +8,10 @@ from rich.table import Table
 
 from orchestrator.cases.scenario.flow_figures import power_flow_json
 from orchestrator.output.report import mode_tables
+from orchestrator.output.report.column_table import ShownTable
 from orchestrator.output.report.power_flow import COLUMNS, flow_table, totals
-from orchestrator.output.report.table import ShownTable
-from orchestrator.output.report.tables import first_few, make_table, share_text
+from orchestrator.output.report.short_texts import first_few, share_text
+from orchestrator.output.report.terminal_tables import make_table
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.output.results.signals import relative_difference, signal
 from orchestrator.studies.modes.modes import ModesResult, named_json

@@ -5,7 +5,7 @@ from typing import Any
 
 from orchestrator.cases.networks.branch_limits import Loading
 from orchestrator.core.errors import number_of
-from orchestrator.output.report.table import Column, ColumnTable
+from orchestrator.output.report.column_table import Column, ColumnTable
 from orchestrator.studies.screening.study import ScreenedItem
 from orchestrator.studies.screening.summary import Summary
 

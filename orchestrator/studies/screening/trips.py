@@ -3,7 +3,7 @@
 from typing import Any
 
 from orchestrator.core.errors import few
-from orchestrator.output.report.table import Column, ColumnTable
+from orchestrator.output.report.column_table import Column, ColumnTable
 from orchestrator.studies.screening.record import OutageRun
 from orchestrator.studies.screening.study import ScreenedItem
 from orchestrator.studies.screening.summary import Summary

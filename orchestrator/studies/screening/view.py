@@ -17,6 +17,8 @@ from orchestrator.core.late import pd
 from orchestrator.core.options import Option
 from orchestrator.core.safe_files import made_folder, write_text
 from orchestrator.core.truth import NoTruth
+from orchestrator.output.report.colours import colour
+from orchestrator.output.report.column_table import Column, ColumnTable, Marked
 from orchestrator.output.report.explorer_cells import CELLS, Cell, CellLine, Cells
 from orchestrator.output.report.html.charts import (
     ChartCurve,
@@ -25,11 +27,10 @@ from orchestrator.output.report.html.charts import (
     legend,
     line_chart,
 )
-from orchestrator.output.report.html.elements import SHADES, Figures, colour, document
+from orchestrator.output.report.html.elements import SHADES, Figures, document
 from orchestrator.output.report.mode_tables import damping, eigenvalue_text
 from orchestrator.output.report.notebook import page
-from orchestrator.output.report.table import Column, ColumnTable, Marked
-from orchestrator.output.report.tables import kinds_of
+from orchestrator.output.report.short_texts import kinds_of
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.output.results.staging import new_run_id, staged
 from orchestrator.output.results.storage import save_json

@@ -10,7 +10,7 @@ from orchestrator.core.options import Option, command
 from orchestrator.linear.spectra.critical_modes import DENSE
 from orchestrator.linear.spectra.shifted_equations import GROWING
 from orchestrator.linear.spectra.stability import zeros_in_words
-from orchestrator.output.report.tables import VerdictSentence
+from orchestrator.output.report.verdict_sentence import VerdictSentence
 from orchestrator.studies.operating_points.columns import Elements
 from orchestrator.studies.operating_points.item import Status
 from orchestrator.studies.operating_points.line_ends import LineEnd

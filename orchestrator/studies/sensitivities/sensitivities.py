@@ -25,7 +25,7 @@ from orchestrator.linear.models.periodic import model_of
 from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.linear.spectra.continuation import Eigenpair, pair_at, pairs_near
 from orchestrator.linear.spectra.modes import Mode
-from orchestrator.output.report.tables import first_few
+from orchestrator.output.report.short_texts import first_few
 from orchestrator.simulation.watch.limits import limits_that_act
 from orchestrator.studies.modes.modes import ModesResult, changed, modes_from, running
 from orchestrator.studies.sensitivities.derivative import Derivative, Shift, differentiate

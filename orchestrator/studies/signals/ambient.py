@@ -11,7 +11,8 @@ from typing import Any, Literal
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder, write_text
 from orchestrator.linear.signals.ambient import AmbientMode
-from orchestrator.output.report.html.elements import colour, damping, document, table
+from orchestrator.output.report.colours import colour
+from orchestrator.output.report.html.elements import damping, document, table
 from orchestrator.output.report.notebook import page
 from orchestrator.output.results.staging import new_run_id, staged
 from orchestrator.output.results.storage import save_json, save_table

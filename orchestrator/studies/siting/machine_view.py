@@ -8,8 +8,8 @@ from html import escape
 from typing import Any
 
 from orchestrator.core.errors import few
+from orchestrator.output.report.column_table import ShownTable
 from orchestrator.output.report.html.elements import document
-from orchestrator.output.report.table import ShownTable
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.points.code import code_hash

@@ -11,10 +11,10 @@ from typing import Any
 from orchestrator.core.errors import few
 from orchestrator.core.truth import all_true
 from orchestrator.linear.spectra.modes import Mode, damping_percent
+from orchestrator.output.report.column_table import ShownTable
 from orchestrator.output.report.html.elements import SHADES, Figures, damping, document, table
 from orchestrator.output.report.html.network_map import network_map
-from orchestrator.output.report.table import ShownTable
-from orchestrator.output.report.tables import share_text
+from orchestrator.output.report.short_texts import share_text
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.points.code import code_hash

@@ -9,7 +9,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestrator.output.report.plot_style import STYLE, colour, save_figure
+from orchestrator.output.report.colours import colour
+from orchestrator.output.report.plot_style import STYLE, save_figure
 from orchestrator.studies.runs.mode_plots import damping_rays
 from orchestrator.studies.sweep.dataset import Curve, Samples
 from orchestrator.studies.sweep.sweep import ScenarioSweep

@@ -6,7 +6,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from orchestrator.core.errors import number_of
-from orchestrator.output.report.tables import make_table
+from orchestrator.output.report.terminal_tables import make_table
 from orchestrator.studies.sweep.axes import grid_places
 from orchestrator.studies.sweep.dataset import Samples, warned
 from orchestrator.studies.sweep.limit import Ending

@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 from html import escape
 
 from orchestrator.core.safe_files import file_hash
+from orchestrator.output.report.colours import colour
 from orchestrator.output.report.html.charts import ChartCurve, legend, line_chart, thinned
-from orchestrator.output.report.html.elements import Figures, bullet_list, colour, document, table
+from orchestrator.output.report.html.elements import Figures, bullet_list, document, table
 from orchestrator.studies.validation.event import EventComparison
 from orchestrator.studies.validation.figures import SIGNALS
 from orchestrator.studies.validation.limits import LimitVerdict

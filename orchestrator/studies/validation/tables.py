@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from orchestrator.output.report.table import ShownTable
+from orchestrator.output.report.column_table import ShownTable
 from orchestrator.studies.validation.causes import Explanation
 from orchestrator.studies.validation.limits import Criterion
 from orchestrator.studies.validation.study import FitCheck, ValidationResult

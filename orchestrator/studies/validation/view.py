@@ -13,10 +13,11 @@ from orchestrator.core.asked import whole_number
 from orchestrator.core.errors import number_of
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder
+from orchestrator.output.report.column_table import ShownTable
 from orchestrator.output.report.notebook import page
 from orchestrator.output.report.pdf import print_pdf
-from orchestrator.output.report.table import ShownTable
-from orchestrator.output.report.tables import PlainTable, VerdictSentence, make_table
+from orchestrator.output.report.terminal_tables import PlainTable, make_table
+from orchestrator.output.report.verdict_sentence import VerdictSentence
 from orchestrator.output.results.staging import new_run_id, staged
 from orchestrator.output.results.storage import save_json, save_table
 from orchestrator.studies.validation.event import EventComparison

@@ -12,7 +12,7 @@ from orchestrator.devices.fmi import wine
 from orchestrator.devices.fmi.archive import extract
 from orchestrator.devices.fmi.description import VariableInfo, read_declared, read_description
 from orchestrator.face.cli import main
-from orchestrator.output.report import tables
+from orchestrator.output.report import fmu_variables
 
 XML = "modelDescription.xml"
 
@@ -162,7 +162,7 @@ def test_an_archive_with_backslashes_is_called_what_it_is_and_shown(fmu_path, tm
 
 
 def test_many_variables_are_listed_without_a_table(rewritten, monkeypatch, capsys):
-    monkeypatch.setattr(tables, "_MOST_IN_A_TABLE", 3)
+    monkeypatch.setattr(fmu_variables, "_MOST_IN_A_TABLE", 3)
     assert main(["fmu", "info", str(rewritten(lambda text: text + "\n"))]) == 0
     lines = capsys.readouterr().out.splitlines()
     (row,) = [line.split() for line in lines if line.startswith("S_n ")]

@@ -12,7 +12,7 @@ from rich.console import Console
 from orchestrator.face.cli import main
 from orchestrator.face.cli.terminal import warn
 from orchestrator.output.report.plot_style import add_legend, save_figure
-from orchestrator.output.report.tables import make_table
+from orchestrator.output.report.terminal_tables import make_table
 from tests.devices.acceptance.gallery.build import Source, Variable, build
 
 ROOT = Path(__file__).parents[3]

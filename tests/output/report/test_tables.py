@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from orchestrator.face.cli import main
-from orchestrator.output.report.table import Column, ColumnTable
-from orchestrator.output.report.tables import kinds_of
+from orchestrator.output.report.column_table import Column, ColumnTable
+from orchestrator.output.report.short_texts import kinds_of
 from tests.support.printed import eigenvalue, in_markdown, on_page, on_terminal, value
 
 SCENARIOS = ["--scenario", "base", "--scenario", "pod_p"]

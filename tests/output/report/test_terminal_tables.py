@@ -6,8 +6,10 @@ import pytest
 from rich.console import Console
 
 from orchestrator.devices.fmi.description import read_description
+from orchestrator.output.report.fmu_variables import fmu_variables
 from orchestrator.output.report.mode_tables import eigenvalue_text
-from orchestrator.output.report.tables import first_few, fmu_variables, make_table
+from orchestrator.output.report.short_texts import first_few
+from orchestrator.output.report.terminal_tables import make_table
 
 
 def printed(table, width=160):

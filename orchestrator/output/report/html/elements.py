@@ -10,13 +10,6 @@ from typing import Any
 
 from orchestrator.cases.networks.element_names import ElementNames
 
-COLOURS = ("#4d4d4d", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-"""Distinguishable with any colour vision (Okabe and Ito); a scenario keeps its colour everywhere."""
-
-
-def colour(index: int) -> str:
-    return COLOURS[index % len(COLOURS)]
-
 
 def table(
     caption: str, columns: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1

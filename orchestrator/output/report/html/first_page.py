@@ -8,7 +8,7 @@ from orchestrator.output.report.html.chapters.chapter import Chapter
 from orchestrator.output.report.html.elements import SHADES, table
 from orchestrator.output.report.html.origins import given_in
 from orchestrator.output.report.html.verdict_lines import verdicts
-from orchestrator.output.report.tables import short
+from orchestrator.output.report.short_texts import short
 
 _NOTHING = "nothing was left out"
 

@@ -6,6 +6,7 @@ from html import escape
 import numpy as np
 
 from orchestrator.core.errors import number_of
+from orchestrator.output.report.colours import colour
 from orchestrator.output.report.html.charts import (
     ChartCurve,
     Mark,
@@ -14,12 +15,7 @@ from orchestrator.output.report.html.charts import (
     legend,
     line_chart,
 )
-from orchestrator.output.report.html.elements import (
-    SHADES,
-    Figures,
-    colour,
-    table,
-)
+from orchestrator.output.report.html.elements import SHADES, Figures, table
 from orchestrator.output.report.html.folder import Results
 from orchestrator.output.report.linearised import exceptions_in_words
 from orchestrator.output.report.mode_tables import mode_shifts, named_modes, ring_downs

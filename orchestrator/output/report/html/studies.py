@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from orchestrator.output.report.colours import colour
 from orchestrator.output.report.html.charts import (
     ChartCurve,
     Mark,
@@ -14,14 +15,7 @@ from orchestrator.output.report.html.charts import (
     legend,
     line_chart,
 )
-from orchestrator.output.report.html.elements import (
-    Figures,
-    colour,
-    damping,
-    eigenvalue,
-    number,
-    table,
-)
+from orchestrator.output.report.html.elements import Figures, damping, eigenvalue, number, table
 
 
 def axis_of(sweep: xr.Dataset) -> str:

@@ -9,8 +9,9 @@ import numpy as np
 import xarray as xr
 
 from orchestrator.core.arrays import Numbers
+from orchestrator.output.report.colours import colour
 from orchestrator.output.report.html.charts import ChartCurve, legend, line_chart
-from orchestrator.output.report.html.elements import Figures, bullet_list, colour, table
+from orchestrator.output.report.html.elements import Figures, bullet_list, table
 from orchestrator.studies.certification.certificate import Certificate
 from orchestrator.studies.certification.codes.bench_point import BenchResult
 from orchestrator.studies.certification.codes.criteria import POWER_SHOWN

@@ -5,8 +5,9 @@ import re
 import numpy as np
 import pytest
 
+from orchestrator.output.report.colours import colour
 from orchestrator.output.report.html.charts import legend
-from orchestrator.output.report.html.elements import Figures, colour
+from orchestrator.output.report.html.elements import Figures
 from orchestrator.studies.certification.codes.all_codes import CODES
 from orchestrator.studies.certification.codes.bench_point import BenchResult
 from orchestrator.studies.certification.codes.known import code_for

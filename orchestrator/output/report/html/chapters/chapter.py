@@ -8,8 +8,8 @@ from math import pi
 from pathlib import Path
 from typing import Any
 
+from orchestrator.output.report.colours import colour
 from orchestrator.output.report.html.charts import Mark, complex_plane, legend
-from orchestrator.output.report.html.elements import colour
 from orchestrator.output.report.html.least_damped import LeastDamped
 from orchestrator.output.report.html.origins import origin_of
 from orchestrator.output.report.html.verdict_lines import VerdictLine

@@ -9,8 +9,8 @@ from pathlib import Path
 from orchestrator.core.errors import number_of
 from orchestrator.output.report.html.chapters.chapter import Chapter, Content
 from orchestrator.output.report.html.elements import table
+from orchestrator.output.report.short_texts import short
 from orchestrator.output.report.strength_table import strength_table
-from orchestrator.output.report.tables import short
 
 _LONGEST = 300
 """Characters of an answer that names the buses of a scenario; the table below has all."""

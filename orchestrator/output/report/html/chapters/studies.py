@@ -9,6 +9,7 @@ import xarray as xr
 
 from orchestrator.core.errors import number_of
 from orchestrator.core.truth import all_true
+from orchestrator.output.report.colours import colour
 from orchestrator.output.report.html import studies
 from orchestrator.output.report.html.chapters.chapter import (
     Chapter,
@@ -18,7 +19,7 @@ from orchestrator.output.report.html.chapters.chapter import (
     modes_map,
 )
 from orchestrator.output.report.html.charts import bar_chart
-from orchestrator.output.report.html.elements import VERDICTS, colour, table
+from orchestrator.output.report.html.elements import VERDICTS, table
 from orchestrator.output.report.html.least_damped import LeastDamped
 
 _SHOWN = 4

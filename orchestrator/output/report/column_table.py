@@ -12,15 +12,15 @@ from typing import Any, Generic, TypeVar
 from rich.text import Text
 
 from orchestrator.core.late import pd
+from orchestrator.output.report.colours import OF_MARKS
 from orchestrator.output.report.html.elements import table as table_of_page
-from orchestrator.output.report.tables import PlainTable, make_table
+from orchestrator.output.report.terminal_tables import PlainTable, make_table
 from orchestrator.output.results.storage import save_table
 
 Row = TypeVar("Row")
 
 _DATE = r"\d{4}-\d\d-\d\d( \d\d:\d\d:\d\d)?"
 _MINUS = re.compile(r"^-(?=\d)")
-_ON_TERMINALS = {"good": "bold green", "bad": "bold red", "soft": "bold yellow"}
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class ShownTable:
     def __rich__(self) -> PlainTable:
         table = make_table(self.title, *self.headings, left=self.left)
         for k, row in enumerate(self.rows):
-            cells = [c if isinstance(c, str) else Text(c.text, _ON_TERMINALS[c.mark]) for c in row]
+            cells = [c if isinstance(c, str) else Text(c.text, OF_MARKS[c.mark]) for c in row]
             style = "bold" if any(self.stand_out[k : k + 1]) else None
             ends = len(set(self.parts[k : k + 2])) > 1
             table.add_row(*cells, style=style, end_section=ends)

@@ -1,0 +1,34 @@
+"""Long texts and lists in short: cut, counted, or those alike told once."""
+
+import re
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar
+
+Told = TypeVar("Told")
+_FIGURE = re.compile(r"[-+]?\b\d[\d.,]*(?:e[-+]?\d+)?")
+_ITEMS_SHOWN = 5  # how many of a long list are shown, largest first
+
+
+def first_few(items: Iterable[Any], text: Callable[[Any], str]) -> str:
+    items = list(items)
+    shown = ", ".join(text(item) for item in items[:_ITEMS_SHOWN])
+    return shown + (f" … {len(items)} in all" if len(items) > _ITEMS_SHOWN else "")
+
+
+def kinds_of(said: Iterable[tuple[Told, Iterable[str]]]) -> list[tuple[str, list[Told]]]:
+    """Texts with all that tell them, the most told first; those that differ only in their figures are one."""
+    found: dict[str, tuple[str, list[Told]]] = {}
+    for teller, texts in said:
+        for kind, text in {_FIGURE.sub("#", text): text for text in texts}.items():
+            found.setdefault(kind, (text, []))[1].append(teller)
+    return sorted(found.values(), key=lambda kind: -len(kind[1]))
+
+
+def short(text: str, longest: int) -> str:
+    """A remark, cut at a word where it has more characters."""
+    return text if len(text) <= longest else f"{text[: longest - 1].rsplit(' ', 1)[0]} …"
+
+
+def share_text(entry: tuple[str, float]) -> str:
+    """``sg1 28%``."""
+    return f"{entry[0]} {entry[1]:.0%}"
