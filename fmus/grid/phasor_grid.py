@@ -2,8 +2,6 @@
 
     (Y + Σ y)·v = Σ y·e          solved directly from the newest emfs whenever an output is read: there is no state
 
-The matrix is data, which the kernel factorises anew where a parameter or an admittance changes.
-
 Elements, parameters and outputs are those of `grid`. Constant-impedance loads, ratios and open lines behave as
 described there."""
 
@@ -15,7 +13,7 @@ from fmus.grid.fault import declare_fault_outputs, fault_admittance
 from fmus.grid.line_parts import LineParts, declare_line_parts
 from fmus.grid.load_laws import FollowingLoad, declare_following_load, following_load_equations
 from fmus.grid.network import Line, Network, Port
-from fmus.grid.nodal import Admittances, add_admittance
+from fmus.grid.nodal_equations import Admittances, add_admittance, solve_for_voltages
 from fmus.grid.three_winding import add_windings, declare_winding_powers, declare_windings
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
@@ -67,7 +65,7 @@ def phasor_grid(network: Network) -> Model:
     transformers = [declare_windings(m, data) for data in network.transformers]
     for transformer in transformers:
         add_windings(Y, transformer)
-    _settle(m, buses, Y)
+    solve_for_voltages(m, buses, Y)
     for following_load in following:
         following_load_equations(m, following_load)
     drawn = [
@@ -95,19 +93,6 @@ def _declare_line_fault_outputs(
         if line.faulted:
             ends = _behind_ratio(line, values, buses)
             declare_fault_outputs(m, line.name, parts[line.name].fault_current(*ends))
-
-
-def _settle(m: ModelBuilder, buses: dict[str, elements.Bus], Y: Admittances) -> None:
-    """Give every bus its voltage, for which the kernel solves."""
-    place = {name: k for k, name in enumerate(Y)}
-    matrix = {
-        (place[name], place[other]): (y.re, y.im)
-        for name, row in Y.items()
-        for other, y in row.items()
-    }
-    voltages = m.nodes(matrix, [(bus.injected.re, bus.injected.im) for bus in buses.values()])
-    for bus, (re, im) in zip(buses.values(), voltages, strict=True):
-        bus.v = Phasor(re, im)
 
 
 def _declare_source(

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from fmus.grid.element_data import ThreeWinding
 from fmus.grid.elements import Bus, declare_power
-from fmus.grid.nodal import Admittances, add_admittance
+from fmus.grid.nodal_equations import Admittances, add_admittance
 from fmus.toolchain.frames import Phasor, phasor_derivative, polar
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import BREAKER_TIME

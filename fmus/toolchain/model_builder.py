@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from fmus.toolchain.model import Integrator, Model
-from fmus.toolchain.nodes import Complex, Nodes
+from fmus.toolchain.nodal_equations import Complex, Nodes
 from fmus.toolchain.symbols import (
     Expr,
     Function,

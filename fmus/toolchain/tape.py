@@ -17,7 +17,7 @@ from pathlib import Path
 
 from fmus.toolchain.elimination_plan import plan_elimination
 from fmus.toolchain.model import Model
-from fmus.toolchain.nodes import LARGEST_REST
+from fmus.toolchain.nodal_equations import LARGEST_REST
 from fmus.toolchain.plan import Plan
 from fmus.toolchain.symbols import Expr, Function, Op
 from fmus.toolchain.symbols.operations import UNARY

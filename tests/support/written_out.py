@@ -4,7 +4,7 @@ from dataclasses import replace
 from heapq import heapify, heappop, heappush
 
 from fmus.toolchain.frames import ZERO, Phasor
-from fmus.toolchain.nodes import LARGEST_REST
+from fmus.toolchain.nodal_equations import LARGEST_REST
 from fmus.toolchain.symbols import Expr, Function, fabs, fmax
 
 

@@ -57,8 +57,8 @@ from orchestrator.core.options import Option
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.instance import is_ours
+from orchestrator.systems.coupling.bus_relays import Relay
 from orchestrator.systems.coupling.events import Event
-from orchestrator.systems.coupling.relays import Relay
 from orchestrator.systems.coupling.schedule import (
     SECOND_ORDER,
     Schedule,

@@ -21,9 +21,9 @@ from orchestrator.cases.networks.step_ups import own_branches
 from orchestrator.cases.scenario.measured_points import line_of_numbers
 from orchestrator.core.errors import InputError, Problem, QuestionTopic, few
 from orchestrator.core.options import Option
+from orchestrator.systems.coupling.bus_relays import RATED_FREQUENCY, Relay, Shedding
 from orchestrator.systems.coupling.events import Event, LineSwitching, UnitSwitching
 from orchestrator.systems.coupling.no_trip_regions import NO_TRIP_REGIONS
-from orchestrator.systems.coupling.relays import RATED_FREQUENCY, Relay, Shedding
 
 _UNIT_KINDS = ("sg", "gfor")  # first parts of the names of a unit's generator and converter
 _RATED = "f_n"  # parameter with a device's rated frequency [Hz]

@@ -6,8 +6,8 @@ from dataclasses import replace
 from orchestrator.cases.form.schema import UnitReconnectionTable
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.scenario.start_values import is_connected
+from orchestrator.systems.coupling.bus_relays import Relay
 from orchestrator.systems.coupling.events import UnitSwitching
-from orchestrator.systems.coupling.relays import Relay
 from orchestrator.systems.coupling.schedule import Schedule
 from orchestrator.systems.coupling.system import System
 

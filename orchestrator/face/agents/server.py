@@ -12,18 +12,7 @@ from mcp.types import CallToolResult, InputRequiredResult, Tool, ToolAnnotations
 
 from orchestrator.core.errors import CosimError
 from orchestrator.face.agents.question import Allowance
-from orchestrator.face.agents.verbs import Verbs
-
-VERBS = (
-    "cases",
-    "modes",
-    "run_summary",
-    "screen_worst",
-    "check",
-    "scr",
-    "sensitivities",
-    "explain",
-)
+from orchestrator.face.agents.verbs import VERBS, Verbs
 
 _SHOWN = 40  # characters of an unknown argument's name that an error repeats
 

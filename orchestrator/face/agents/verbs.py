@@ -28,6 +28,18 @@ from orchestrator.face.agents.answers import (
 from orchestrator.face.agents.guard import is_within
 from orchestrator.face.agents.question import Allowance, NoAnswerError, ask
 
+VERBS = (
+    "cases",
+    "modes",
+    "run_summary",
+    "screen_worst",
+    "check",
+    "scr",
+    "sensitivities",
+    "explain",
+)
+"""The methods of `Verbs` that an agent may call, in the order in which it gets them."""
+
 MOST_ROWS = 20
 """Modes, buses, parameters or states that an answer lists: more than a reader compares, and few enough for an agent."""
 

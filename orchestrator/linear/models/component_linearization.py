@@ -16,8 +16,9 @@ from orchestrator.devices.fmi.component import Component, RealBatch
 from orchestrator.devices.fmi.linear_model import EmbeddedModel
 from orchestrator.linear.models.differences import PerturbedStep
 from orchestrator.linear.models.held_inputs import over_held_inputs
+from orchestrator.linear.models.limits_close_by import without_curvature
 from orchestrator.linear.models.linear_model import DIRECTIONAL, PACKED, PERTURBED
-from orchestrator.linear.models.perturbation import perturb, without_curvature
+from orchestrator.linear.models.perturbation import perturb
 from orchestrator.linear.models.response_check import ContinuousModel, check_response
 from orchestrator.linear.models.state_access import (
     StateAccess,

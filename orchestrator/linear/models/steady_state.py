@@ -12,7 +12,7 @@ from orchestrator.core.errors import AnalysisError, ErrorKind
 from orchestrator.core.options import Option, command
 from orchestrator.linear.models.coupled_state import CoupledState
 from orchestrator.linear.models.device_start import misfits_of, sentences
-from orchestrator.linear.models.held_states import (
+from orchestrator.linear.models.drifting_states import (
     HeldState,
     examine_held,
     held_names,

@@ -5,8 +5,8 @@ from math import inf
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.scenario.start_values import is_connected
 from orchestrator.simulation.watch.finding import TRIP, Finding
+from orchestrator.systems.coupling.bus_relays import Relays, Shedding, Trip
 from orchestrator.systems.coupling.events import LoadChange, UnitSwitching
-from orchestrator.systems.coupling.relays import Relays, Shedding, Trip
 
 _UNITS = {"voltage": "pu", "frequency": "Hz"}
 

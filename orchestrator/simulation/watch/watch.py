@@ -35,11 +35,11 @@ from orchestrator.simulation.watch.undisturbed import (
     not_judged,
     undisturbed_motion,
 )
+from orchestrator.systems.coupling.bus_relays import Trip
 from orchestrator.systems.coupling.coupled import LateStart
 from orchestrator.systems.coupling.events import Event
 from orchestrator.systems.coupling.filtered_recorder import FilteredRecorder
 from orchestrator.systems.coupling.recorder import Recorder, RowSink
-from orchestrator.systems.coupling.relays import Trip
 from orchestrator.systems.coupling.system import System
 
 SETTLING = 2.0

@@ -44,9 +44,9 @@ from orchestrator.studies.runs.after_events import modes_after
 from orchestrator.studies.runs.checkpoint_mark import computed
 from orchestrator.studies.runs.checkpoints import Checkpoints
 from orchestrator.studies.runs.ring_down import ring_down_of
+from orchestrator.systems.coupling.bus_relays import Trip
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.observers import Observer
-from orchestrator.systems.coupling.relays import Trip
 from orchestrator.systems.coupling.run_state import NOT_KEPT
 from orchestrator.systems.coupling.schedule import jacobi
 from orchestrator.systems.coupling.statistics import StepStatistics

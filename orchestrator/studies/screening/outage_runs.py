@@ -19,6 +19,7 @@ from orchestrator.studies.operating_points.line_ends import LineEnd
 from orchestrator.studies.operating_points.outages import what_remains
 from orchestrator.studies.operating_points.preparation import ItemPreparation
 from orchestrator.studies.screening.record import OutageRun, RelayTrip, WentWrong
+from orchestrator.systems.coupling.bus_relays import Trip
 from orchestrator.systems.coupling.events import (
     BusFault,
     Event,
@@ -28,7 +29,6 @@ from orchestrator.systems.coupling.events import (
     ShuntSwitching,
     UnitSwitching,
 )
-from orchestrator.systems.coupling.relays import Trip
 
 BEGIN = 1.0  # time at which the outage, or the fault before it, happens [s]
 

@@ -16,10 +16,10 @@ from orchestrator.devices.fmi.component import Component
 from orchestrator.devices.fmi.converted import ConvertedComponent
 from orchestrator.devices.fmi.interrupts import calls
 from orchestrator.devices.fmi.isolation import IsolatedComponent
+from orchestrator.systems.coupling.bus_relays import Relays
 from orchestrator.systems.coupling.events import Event, NotANumber, Silence, WireFault, WireRecovery
 from orchestrator.systems.coupling.kept_form import check_form, of_this_run
 from orchestrator.systems.coupling.observers import Observer
-from orchestrator.systems.coupling.relays import Relays
 from orchestrator.systems.coupling.run_state import (
     Keeper,
     Resumable,

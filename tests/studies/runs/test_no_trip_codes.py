@@ -5,7 +5,7 @@ import pytest
 from orchestrator.cases.case import load_case, with_protection
 from orchestrator.core.errors import CaseError
 from orchestrator.studies.runs.run import run_scenario
-from orchestrator.systems.coupling.relays import Relays
+from orchestrator.systems.coupling.bus_relays import Relays
 from tests.support.mill import RAW, mill_case
 
 OWN_RELAY = "1 'VTGTPAT' 2 2 '1' 0.8 9 0.05 0"

@@ -14,7 +14,7 @@ from orchestrator.studies.runs.answer_of_run import of_run
 from orchestrator.studies.runs.files import summary_of
 from orchestrator.studies.runs.like import run_like
 from orchestrator.studies.runs.run import run_scenario
-from orchestrator.systems.coupling.relays import FREQUENCY_LAG, Relays
+from orchestrator.systems.coupling.bus_relays import FREQUENCY_LAG, Relays
 from tests.support.mill import RAW, mill_case
 from tests.support.scenarios import prepare_one
 

@@ -1,4 +1,6 @@
-"""Relays that watch a bus in a run and order events: trips of units, of buses, and shedding of loads.
+"""Relays that watch voltage or frequency of a bus in a run and order trips of units or buses, or shed loads.
+
+None watches the impedance or the current of a line.
 
 The relays look at their buses at regular times. A relay picks up when it sees its quantity beyond a limit, and forgets
 that when it sees it within again. If it was beyond for the relay's delay, the relay trips: it orders its events, which
