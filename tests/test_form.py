@@ -21,6 +21,7 @@ PLANTED = {
     "constructors full of comprehensions": "C([i for i in a], [i for i in b], {i for i in c}, d)",
     "docstrings that begin with What, Whether, Of or As": 'def f():\n    """Whether it is."""',
     "functions named by a bare participle": "def told():\n    pass",
+    "functions that grew too long": "def f(x):\n" + 100 * "    x = x + 1\n",
 }
 PLAIN = '''
 def count(values):

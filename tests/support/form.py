@@ -22,6 +22,9 @@ MOST_IN_A_STATEMENT = 2
 MOST_POSITIONAL = 6
 """Arguments that a call may pass by their place; a reader cannot tell the seventh from the sixth."""
 
+MOST_IN_A_FUNCTION = 450
+"""Syntax nodes of a function: about 60 lines, which hold several ideas that could have names."""
+
 MANY_FIELDS = 4
 """Arguments from which on a constructor is looked at for comprehensions in most of them."""
 
@@ -193,6 +196,15 @@ def participles_as_functions(source: SourceFile) -> Iterator[int]:
             yield node.lineno
 
 
+def long_functions(source: SourceFile) -> Iterator[int]:
+    """Functions that grew beyond what one reads as one idea; no layout changes their size."""
+    for node in source.walked:
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            held = sum(isinstance(inner, ast.expr | ast.stmt) for inner in ast.walk(node))
+            if held > MOST_IN_A_FUNCTION:
+                yield node.lineno
+
+
 RULES: dict[str, Finder] = {
     "marks for the formatter": marks_for_the_formatter,
     "conditionals inside conditionals": nested_conditionals,
@@ -204,6 +216,7 @@ RULES: dict[str, Finder] = {
     "constructors full of comprehensions": crowded_constructors,
     "docstrings that begin with What, Whether, Of or As": fragments_as_docstrings,
     "functions named by a bare participle": participles_as_functions,
+    "functions that grew too long": long_functions,
 }
 
 

@@ -315,7 +315,14 @@ class HostedComponent(RemoteCalls):
         ``step_size``: communication step [s].
         ``network``: what it stands at, with one row that stays; its state moves on."""
         status, stage, done, values = self._process.run(
-            self.number, _references(into), rows, _references(out), steps, time, step_size, network
+            self.number,
+            _references(into),
+            rows,
+            _references(out),
+            steps=steps,
+            time=time,
+            step_size=step_size,
+            network=network,
         )
         if status > 1:
             self.check(status, _STAGES.get(stage, "fmi2DoStep"), time + done * step_size)
@@ -332,7 +339,9 @@ class HostedComponent(RemoteCalls):
         return status
 
     def _do_step(self, _pointer: int, time: float, step_size: float, _no_set_state: int) -> int:
-        return self._process.run(self.number, _NONE, _EMPTY, _NONE, 1, time, step_size)[0]
+        return self._process.run(
+            self.number, _NONE, _EMPTY, _NONE, steps=1, time=time, step_size=step_size
+        )[0]
 
     def jacobian(self, unknowns: Sequence[str], knowns: Sequence[str]) -> NoReturn:
         raise ComponentError(

@@ -66,14 +66,14 @@ class RealSchur:
         real, imaginary = np.zeros(n), np.zeros(n)
         low, high = ctypes.c_int(), ctypes.c_int()
         call = _Call()
-        call("dgebal", b"B", n, T, n, low, high, self._scale)
+        call("dgebal", job=b"B", n=n, a=T, lda=n, ilo=low, ihi=high, scale=self._scale)
         self._low, self._high = low.value, high.value
-        call.with_room(n, "dgehrd", n, self._low, self._high, T, n, tau)
+        between: dict[str, Any] = {"n": n, "ilo": self._low, "ihi": self._high}
+        call.with_room(n, "dgehrd", **between, a=T, lda=n, tau=tau)
         self._Q = Q = T.copy(order="F")
-        call.with_room(n, "dorghr", n, self._low, self._high, Q, n, tau)
-        call.with_room(
-            n, "dhseqr", b"S", b"V", n, self._low, self._high, T, n, real, imaginary, Q, n
-        )
+        call.with_room(n, "dorghr", **between, a=Q, lda=n, tau=tau)
+        schur: dict[str, Any] = {"h": T, "ldh": n, "wr": real, "wi": imaginary, "z": Q, "ldz": n}
+        call.with_room(n, "dhseqr", job=b"S", compz=b"V", **between, **schur)
         self.values = real + 1j * imaginary
         return call.succeeded
 
@@ -84,24 +84,35 @@ class RealSchur:
         found, call = ctypes.c_int(), _Call()
         call(
             "dtrevc",
-            b"B",
-            b"S",
-            wanted.copy(),
-            n,
-            self._T,
-            n,
-            left,
-            n,
-            right,
-            n,
-            room,
-            found,
-            np.zeros(3 * n),
+            side=b"B",
+            howmny=b"S",
+            select=wanted.copy(),
+            n=n,
+            t=self._T,
+            ldt=n,
+            vl=left,
+            ldvl=n,
+            vr=right,
+            ldvr=n,
+            mm=room,
+            m=found,
+            work=np.zeros(3 * n),
         )
         whole = []
         for side, vectors in ((b"L", left), (b"R", right)):
             turned = np.asfortranarray(self._Q @ vectors)
-            call("dgebak", b"B", side, n, self._low, self._high, self._scale, room, turned, n)
+            call(
+                "dgebak",
+                job=b"B",
+                side=side,
+                n=n,
+                ilo=self._low,
+                ihi=self._high,
+                scale=self._scale,
+                m=room,
+                v=turned,
+                ldv=n,
+            )
             whole.append(turned)
         if not call.succeeded:
             raise np.linalg.LinAlgError("LAPACK refuses to compute eigenvectors from a Schur form")
@@ -134,24 +145,28 @@ def lapack() -> dict[str, Any] | None:
 
 
 class _Call:
-    """Calls of LAPACK's routines, and whether all succeeded so far."""
+    """Calls of LAPACK's routines, and whether all succeeded so far.
+
+    Arguments have the names of LAPACK's manual and stand in its order, in which Fortran takes them."""
 
     def __init__(self) -> None:
         self.succeeded = True
 
-    def __call__(self, name: str, *arguments: Any) -> None:
+    def __call__(self, name: str, /, **arguments: Any) -> None:
         """Call a routine; the last argument, its success, is added."""
         routines, success = lapack(), ctypes.c_int()
         assert routines is not None
-        routines[name](*(_passed(argument) for argument in arguments), ctypes.byref(success))
+        routines[name](
+            *(_passed(argument) for argument in arguments.values()), ctypes.byref(success)
+        )
         self.succeeded &= success.value == 0
 
-    def with_room(self, least: int, name: str, *arguments: Any) -> None:
+    def with_room(self, least: int, name: str, /, **arguments: Any) -> None:
         """Call a routine that says how much room it needs for its work, and which refuses less than the least."""
         needed = np.zeros(1)
-        self(name, *arguments, needed, -1)
+        self(name, **arguments, work=needed, lwork=-1)
         room = max(int(needed[0]), least)
-        self(name, *arguments, np.zeros(room), room)
+        self(name, **arguments, work=np.zeros(room), lwork=room)
 
 
 def _passed(argument: Any) -> Any:

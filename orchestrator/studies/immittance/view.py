@@ -170,14 +170,7 @@ def _by_bus(result: CutResult) -> Iterator[RenderableType]:
         ratios = "SCR is" if result.gscr is None else f"SCR, and gSCR of {result.gscr:.3g}, are"
         yield make_table(
             f"At each bus alone ({ratios} no margin: devices and settings differ at one ratio)",
-            "Bus",
-            "Devices",
-            "Distance",
-            "at [Hz]",
-            "Gain",
-            "Phase",
-            "Without it",
-            "SCR",
+            *("Bus", "Devices", "Distance", "at [Hz]", "Gain", "Phase", "Without it", "SCR"),
             rows=rows,
         )
     for one in result.critical if rows else ():

@@ -36,15 +36,19 @@ def trajectories(samples: Samples) -> Table:
             top, most = max(curve, key=lambda entry: float(entry[1]["damping"]))
             alike = [f["similarity"] for _, f in curve if f["similarity"] == f["similarity"]]
             named = sum(f["named"] for _, f in curve)
-            table.add_row(
+            points = f"{len(curve)}"
+            if named not in (0, len(curve)):
+                points += f", named at {named}"
+            cells = (
                 f"{sweep.prepared.title}: {trajectory.name}",
                 f"{first['frequency']:.3f} → {last['frequency']:.3f}",
                 f"{first['damping']:.2f} → {last['damping']:.2f}",
                 f"{least['damping']:.2f} at {_values(samples, where)}",
                 f"{most['damping']:.2f} at {_values(samples, top)}",
-                f"{len(curve)}" if named in (0, len(curve)) else f"{len(curve)}, named at {named}",
+                points,
                 f"{min(alike):.2f}" if alike else "–",
             )
+            table.add_row(*cells)
         table.add_section()
     table.caption = (
         "Alike: the least likeness of the mode's shape from point to point; 1 is the same."

@@ -10,7 +10,6 @@ from orchestrator.cases.networks.psse.dyr_mistakes import (
     count_repeats,
     other_network,
     records_unfit,
-    remedy_for,
     slips,
     without_machine,
 )
@@ -22,7 +21,6 @@ from orchestrator.cases.networks.psse.machine_model import (
     KNOWN_RECORDS,
     OF_PLANTS,
     SOURCE_IMPEDANCE,
-    WITHOUT_INERTIA,
     MachineModel,
     plant_of,
 )
@@ -30,14 +28,13 @@ from orchestrator.cases.networks.psse.missing_models import (
     MissingModel,
     in_words,
     is_own,
-    kind_of,
     missing_models,
     names_load,
 )
+from orchestrator.cases.networks.psse.parts_of_machines import MachineKey, PartsOfMachines
 from orchestrator.cases.networks.psse.plant_points import measured_points
-from orchestrator.cases.networks.psse.raw_network import Machine, unit_labels
+from orchestrator.cases.networks.psse.raw_network import Machine
 from orchestrator.cases.networks.psse.record_doubts import doubts_of_machine
-from orchestrator.cases.networks.psse.record_values import values_of_record
 from orchestrator.core.errors import InputError, first_of
 from orchestrator.core.options import Option
 
@@ -59,101 +56,84 @@ def machine_models(
     ``replaced``: machines in whose place a converter of the case stands: they need no record.
     ``approximate``: whether WECC's grid-following converters become `gfl_phasor`, which leaves a part of them out; else
     those of REGCA1 are models of their own."""
-    at = {(machine.bus, machine.name.strip()): machine for machine in machines}
-    problems: list[str] = []
-    parts: dict[tuple[int, str], dict[str, str]] = {key: {} for key in at}
-    values: dict[tuple[int, str], dict[str, float]] = {key: {} for key in at}
-    lines: dict[tuple[int, str], dict[str, int]] = {key: {} for key in at}
-    names: dict[tuple[int, str], dict[str, str]] = {key: {} for key in at}
     left = {name.upper() for name in leaving_out}
     _refuse_absent(leaving_out, records)
     # a load may have the identifier of the machine at its bus
     records = [record for record in records if not names_load(record.name)]
-    labels = unit_labels(machines)
-    of: dict[tuple[int, str], list[DynamicRecord]] = {key: [] for key in at}
-    # machines whose own record no part stands for
-    lacking: set[tuple[int, str]] = set()
-    without: set[str] = set()  # names of converters' records, which have a remedy of their own
-    first: dict[str, str] = {}  # place of the first record, by the problem
-    there = {*at, *idle}
+    found = PartsOfMachines(machines, left, approximate=approximate)
+    for record in records:
+        found.take(record)
+    place_limiters([] if found.problems else records, left, found.parts, found.values)
+    found.give_infinite_machines()
+    measured = measured_points(found.records, found.parts, found.problems)
+    following: dict[MachineKey, MachineModel] = {}
+    if approximate:
+        following = models_of_following(found.records, left, found.problems, found.labels)
+    for key in following:
+        found.parts[key]["converter"] = MODEL
+    _refuse_what_lacks(found, records, left, {*replaced}, {*idle})
+    return following | {
+        key: replace(
+            _own_model(found, key, elsewhere=key in measured, is_open=found.is_open(key)),
+            lines=found.lines[key],
+            replaced=tuple(_left_out_of_plant(found.parts[key], found.records[key], left)),
+            measured=measured.get(key),
+            doubts=tuple(doubts_of_machine(machine, found.records[key], found.values[key])),
+        )
+        for key, machine in found.machines.items()
+        if {"machine", "converter"} & {*found.parts[key]} and key not in following
+    }
+
+
+def _refuse_what_lacks(
+    found: PartsOfMachines,
+    records: Sequence[DynamicRecord],
+    left: set[str],
+    replaced: Collection[MachineKey],
+    idle: Collection[MachineKey],
+) -> None:
+    """Refuse, all together, what no part stands for, machines without a record, and parts that do not fit."""
+    there = {*found.machines, *idle}
     strange = [
         record
         for record in records
         if (record.bus, record.machine) not in there and record.name in KNOWN_RECORDS
     ]
-    for record in records:
-        key = (record.bus, record.machine)
-        if key in at:
-            of[key].append(record)
-        if key not in at or record.name in left or (approximate and record.name in FIELDS):
-            continue
-        is_left = approximate and record.name in OF_PLANTS
-        known = None if is_left else KNOWN_RECORDS.get(record.name)
-        if known is None:
-            remedy = remedy_for(record.name, labels[key], approximate=approximate)
-            if remedy:
-                problems.append(f"no part of ours stands for {record.name}{remedy}")
-                first.setdefault(problems[-1], record.place)
-                without.add(record.name)
-                lacking |= {key} if kind_of(record.name) == "converter" else set()
-        elif known.kind in parts[key]:
-            problems.append(
-                f"{record.place}: a second {known.kind} of machine {record.machine!r} at bus {record.bus}"
-            )
-        else:
-            parts[key][known.kind] = known.part
-            names[key][known.kind] = record.name
-            try:
-                own = values_of_record(record, known)
-                values[key] |= own
-                lines[key] |= dict.fromkeys(own, record.line)
-            except InputError as error:
-                problems.append(str(error))
-    place_limiters([] if problems else records, left, parts, values)
-    for key in (key for key, machine in at.items() if machine.is_infinite and not of[key]):
-        parts[key]["machine"] = CLASSICAL
-        values[key] |= WITHOUT_INERTIA
-    measured = measured_points(of, parts, problems)
-    following = models_of_following(of, left, problems, labels) if approximate else {}
-    for key in following:
-        parts[key]["converter"] = MODEL
-    unmodelled = without_machine(parts)
-    passed = {*KNOWN_RECORDS, *without, *(left - _own_models(records, left, unmodelled))}
-    passed |= {*(FIELDS if approximate else ())}
-    missing = missing_models(records, at, passed, unmodelled)
-    lacking |= {key for model in missing for key in _machines_of(model) if not model.may_go}
+    unmodelled = without_machine(found.parts)
+    passed = {*KNOWN_RECORDS, *found.without, *(left - _own_models(records, left, unmodelled))}
+    passed |= {*(FIELDS if found.approximate else ())}
+    missing = missing_models(records, found.machines, passed, unmodelled)
+    lacking = {key for model in missing for key in _machines_of(model) if not model.may_go}
     missing = [model for model in missing if model.may_go or not _machines_of(model) <= {*replaced}]
-    accounted = {*replaced, *lacking}
+    accounted = {*replaced, *found.lacking, *lacking}
     bare = [key for key in unmodelled if key not in accounted]
     places = {(record.bus, record.machine) for record in strange}
+    problems = found.problems
     if min(len(places), len(bare)) >= LEAST_STRANGE:
-        problems = [other_network(strange, records, bare, len(at)), *problems]
+        problems = [other_network(strange, records, bare, len(found.machines)), *problems]
         strange = []
         accounted |= {*bare}
-    unfit = records_unfit(parts, accounted, labels)
+    unfit = records_unfit(found.parts, accounted, found.labels)
     problems = [*(slips(strange) if bare else ()), *problems, *unfit]
-    if problems or missing:
-        counted_once = [*count_repeats(problems, first)]
-        listed = first_of(counted_once, _MOST_SHOWN, ("gfor new lists all with " + Option.DETAILS))
-        shown = [*in_words(missing, labels), *listed]
-        raise InputError(
-            "the dynamics data cannot be taken over; correct them, or name models that may go in [units] "
-            "dyr_leave_out:\n  " + "\n  ".join(shown)
-        )
-    open_ = {(record.bus, record.machine) for record in records if record.name in left}
-    return following | {
-        key: replace(
-            _converter(at[key], parts[key], names[key], values[key], key in measured)
-            if "converter" in parts[key]
-            else _machine(at[key], parts[key], values[key], key in open_),
-            lines=lines[key],
-            replaced=tuple(_left_out_of_plant(parts[key], of[key], left)),
-            measured=measured.get(key),
-            doubts=tuple(doubts_of_machine(at[key], of[key], values[key])),
-        )
-        for key in at
-        if {"machine", "converter"} & {*parts[key]} and key not in following
-    }
+    if not problems and not missing:
+        return
+    counted_once = [*count_repeats(problems, found.first_places)]
+    listed = first_of(counted_once, _MOST_SHOWN, ("gfor new lists all with " + Option.DETAILS))
+    shown = [*in_words(missing, found.labels), *listed]
+    raise InputError(
+        "the dynamics data cannot be taken over; correct them, or name models that may go in [units] "
+        "dyr_leave_out:\n  " + "\n  ".join(shown)
+    )
+
+
+def _own_model(
+    found: PartsOfMachines, key: MachineKey, *, elsewhere: bool, is_open: bool
+) -> MachineModel:
+    """The model that the records of a machine make; ``is_open``: whether one of them is left out."""
+    machine, parts, values = found.machines[key], found.parts[key], found.values[key]
+    if "converter" in parts:
+        return _converter(machine, parts, found.names[key], values, elsewhere)
+    return _machine(machine, parts, values, is_open)
 
 
 def _refuse_absent(names: Sequence[str], records: Sequence[DynamicRecord]) -> None:

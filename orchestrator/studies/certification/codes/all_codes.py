@@ -78,12 +78,12 @@ def _ramps(
     name: str,
     title: str,
     clause: str,
+    *more: Judge,
     scr: float,
     rate: float,
     steps: tuple[float, ...],
-    *more: Judge,
 ) -> CodeRow:
-    """Ramps of the source's frequency; ``more``: what is asked beside staying in synchronism."""
+    """Ramps of the source's frequency [Hz/s, Hz]; ``more``: what is asked beside staying in synchronism."""
     return CodeRow(
         name, title, clause, lambda f: ramps(scr, 0.5, f, rate, steps), (c.holds_together(), *more)
     )
@@ -92,7 +92,8 @@ def _ramps(
 def _droop_ramps(title: str, clause: str) -> CodeRow:
     """A row of two codes; 1 and 5 are the events with which the holds above and below begin."""
     asked = (c.settles(), c.follows_droop(1, -1), c.follows_droop(5, 1))
-    return _ramps("rocof", title, clause, 10.0, 4.0, (1.0, -1.0, -1.0, 1.0), *asked)
+    steps = (1.0, -1.0, -1.0, 1.0)
+    return _ramps("rocof", title, clause, *asked, scr=10.0, rate=4.0, steps=steps)
 
 
 def _weakening(clause: str) -> CodeRow:
@@ -227,21 +228,21 @@ ERCOT = GridCode.of(
             "inertia_down",
             "The frequency falls at 1 Hz/s for 0.5 s",
             "inertia",
-            3.0,
-            1.0,
-            (-0.5,),
             c.inertia(0, -1.0, 0.5, LEAST_INERTIA),
             c.settles(),
+            scr=3.0,
+            rate=1.0,
+            steps=(-0.5,),
         ),
         _ramps(
             "inertia_up",
             "The frequency rises at 1 Hz/s for 0.5 s",
             "inertia",
-            3.0,
-            1.0,
-            (0.5,),
             c.inertia(0, 1.0, 0.5, LEAST_INERTIA),
             c.settles(),
+            scr=3.0,
+            rate=1.0,
+            steps=(0.5,),
         ),
         _jumps(
             "phase_jumps", "−10°, +10° at SCR 3, 50 %", "phase jump", 3.0, (-10.0, 10.0), *_OPPOSED
@@ -293,10 +294,10 @@ FINGRID = GridCode.of(
             "rocof",
             "±2 Hz/s to 51 and 49 Hz, SCR 10, 50 %",
             "RoCoF",
-            10.0,
-            2.0,
-            (1.0, -1.0, -1.0, 1.0),
             c.settles(),
+            scr=10.0,
+            rate=2.0,
+            steps=(1.0, -1.0, -1.0, 1.0),
         ),
     ),
 )
@@ -316,10 +317,10 @@ PRC029 = GridCode.of(
             "rocof",
             "60 → 58.9 → 60 → 61.1 → 60 Hz at 5 Hz/s, half power",
             "R3, rate of change of frequency",
-            STRENGTH,
-            5.0,
-            (-1.1, 1.1, 1.1, -1.1),
             *_BACK,
+            scr=STRENGTH,
+            rate=5.0,
+            steps=(-1.1, 1.1, 1.1, -1.1),
         ),
         _jumps(
             "phase_jumps", "−25°, +25°, half power", "R1, jumps up to 25°", STRENGTH, (-25.0, 25.0)
@@ -345,10 +346,10 @@ TR331 = GridCode.of(
             "rocof",
             "50 → 49 → 50 → 51 → 50 Hz at 2 Hz/s, half power",
             "rate of change of frequency",
-            STRENGTH,
-            2.0,
-            (-1.0, 1.0, 1.0, -1.0),
             *_BACK,
+            scr=STRENGTH,
+            rate=2.0,
+            steps=(-1.0, 1.0, 1.0, -1.0),
         ),
         _jumps("phase_jumps", "−20°, +20°, half power", "phase jump", STRENGTH, (-20.0, 20.0)),
     ),

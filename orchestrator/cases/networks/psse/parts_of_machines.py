@@ -1,0 +1,100 @@
+"""The parts of each machine and their parameters, as records of dynamics data say them one by one."""
+
+from collections.abc import Collection, Sequence
+
+from fmus.grid_following.dyr_approximation import FIELDS
+from fmus.toolchain.dyr_form import DyrRecord
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
+from orchestrator.cases.networks.psse.dyr_mistakes import remedy_for
+from orchestrator.cases.networks.psse.machine_model import (
+    CLASSICAL,
+    KNOWN_RECORDS,
+    OF_PLANTS,
+    WITHOUT_INERTIA,
+)
+from orchestrator.cases.networks.psse.missing_models import kind_of
+from orchestrator.cases.networks.psse.raw_network import Machine, unit_labels
+from orchestrator.cases.networks.psse.record_values import values_of_record
+from orchestrator.core.errors import InputError
+
+MachineKey = tuple[int, str]
+"""Bus and identifier of a machine."""
+
+
+class PartsOfMachines:
+    """Parts and parameters of machines, and what is wrong with their records.
+
+    ``parts``, ``names``: our part and PSS/E's record by the kind of part. ``values``, ``lines``: of parameters.
+    ``records``: of each machine, all of them. ``problems``: in the order of the file. ``first_places``: of the first
+    record, by the problem. ``without``: names of converters' records, which have a remedy of their own. ``lacking``:
+    machines whose own record no part stands for."""
+
+    def __init__(
+        self, machines: Sequence[Machine], left: Collection[str], *, approximate: bool
+    ) -> None:
+        self.machines = {(machine.bus, machine.name.strip()): machine for machine in machines}
+        self.labels = unit_labels(machines)
+        self.approximate = approximate
+        self._left = left
+        self.parts: dict[MachineKey, dict[str, str]] = {key: {} for key in self.machines}
+        self.names: dict[MachineKey, dict[str, str]] = {key: {} for key in self.machines}
+        self.values: dict[MachineKey, dict[str, float]] = {key: {} for key in self.machines}
+        self.lines: dict[MachineKey, dict[str, int]] = {key: {} for key in self.machines}
+        self.records: dict[MachineKey, list[DynamicRecord]] = {key: [] for key in self.machines}
+        self.problems: list[str] = []
+        self.first_places: dict[str, str] = {}
+        self.without: set[str] = set()
+        self.lacking: set[MachineKey] = set()
+
+    def take(self, record: DynamicRecord) -> None:
+        """Take a record of a machine in service; others, and models that are left out, set nothing."""
+        key = (record.bus, record.machine)
+        if key not in self.machines:
+            return
+        self.records[key].append(record)
+        if record.name in self._left or (self.approximate and record.name in FIELDS):
+            return
+        is_left = self.approximate and record.name in OF_PLANTS
+        known = None if is_left else KNOWN_RECORDS.get(record.name)
+        if known is None:
+            self._note_unknown(record, key)
+        elif known.kind in self.parts[key]:
+            self.problems.append(
+                f"{record.place}: a second {known.kind} of machine {record.machine!r} at bus {record.bus}"
+            )
+        else:
+            self._set_part(record, key, known)
+
+    def _note_unknown(self, record: DynamicRecord, key: MachineKey) -> None:
+        """Note a record that no part stands for, where it has a remedy of its own."""
+        remedy = remedy_for(record.name, self.labels[key], approximate=self.approximate)
+        if not remedy:
+            return
+        problem = f"no part of ours stands for {record.name}{remedy}"
+        self.problems.append(problem)
+        self.first_places.setdefault(problem, record.place)
+        self.without.add(record.name)
+        if kind_of(record.name) == "converter":
+            self.lacking.add(key)
+
+    def _set_part(self, record: DynamicRecord, key: MachineKey, known: DyrRecord) -> None:
+        self.parts[key][known.kind] = known.part
+        self.names[key][known.kind] = record.name
+        try:
+            own = values_of_record(record, known)
+        except InputError as error:
+            self.problems.append(str(error))
+            return
+        self.values[key] |= own
+        self.lines[key] |= dict.fromkeys(own, record.line)
+
+    def give_infinite_machines(self) -> None:
+        """Give machines that the network calls infinite, and that have no record, a classical one without inertia."""
+        for key, machine in self.machines.items():
+            if machine.is_infinite and not self.records[key]:
+                self.parts[key]["machine"] = CLASSICAL
+                self.values[key] |= WITHOUT_INERTIA
+
+    def is_open(self, key: MachineKey) -> bool:
+        """Return whether a record of a machine is left out."""
+        return any(record.name in self._left for record in self.records[key])
