@@ -1,10 +1,12 @@
 """Continuous model of one running FMU from differences of its own derivatives, without a step.
 
 A screening linearises thousands of operating points, and only a system without a communication step is asked for. What
-answers differently up and down, as at a limit, is left to the perturbation over a step, which tries smaller sizes."""
+answers differently up and down, as at a limit, or a tenth of the perturbation otherwise than the whole, as between two
+limits, is left to the perturbation over a step, which tries smaller sizes."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,10 @@ from orchestrator.linear.models.component_linearization import (
 from orchestrator.systems.coupling.turns import Exchange
 
 _SIZE = 1e-5  # of a perturbation, relative to max(1, |value|)
+_NEAR = 0.1  # part of it, upwards, whose answer shows whether a limit lies within it on both sides
+# an element's answer to that part may differ from what the whole lets expect by this part of it: as
+# two sizes of a perturbation over a step do
+_AGREE = 5e-3
 # an element's answers up and down may differ by this part of it; beyond, a limit is near
 _EVEN = 0.1
 _FLOOR = 1e-2  # rate [1/s] of which they may differ by the same part as well
@@ -63,10 +69,9 @@ def linearize_slopes(
         else _pattern(like, point.names, _answers(states, exits))
     )
     found = None if pattern is None else point.together(pattern)
-    up, down = found or point.one_by_one()
-    whole = (up + down) / 2
-    floor = _FLOOR + _OF_ROW * np.abs(whole).max(axis=1, keepdims=True, initial=0.0)
-    if (np.abs(up - down) > _EVEN * (np.abs(whole) + floor)).any():
+    slopes = found or point.one_by_one()
+    whole = slopes.central
+    if not slopes.are_of_one_line:
         return linearize_component(exchange, time, step_size, inputs, observed, derivatives=True)
     none = np.zeros((0, 0))
     return ComponentLinearization(
@@ -87,6 +92,35 @@ def linearize_slopes(
     )
 
 
+class Slopes(NamedTuple):
+    """Difference quotients, shape (answers, variables): upwards, downwards, and upwards of the part `_NEAR`."""
+
+    up: Matrix
+    down: Matrix
+    near: Matrix
+
+    @property
+    def central(self) -> Matrix:
+        return (self.up + self.down) / 2
+
+    @property
+    def are_of_one_line(self) -> bool:
+        """Tell if a limit is neither on one side nor within the perturbation on both."""
+        whole, bend = self.central, self.up - self.down
+        floor = _FLOOR + _OF_ROW * np.abs(whole).max(axis=1, keepdims=True, initial=0.0)
+        size = np.abs(whole) + floor
+        expected = whole + _NEAR * bend / 2  # the curvature grows with the size
+        is_even, agrees = (
+            np.abs(bend) <= _EVEN * size,
+            np.abs(self.near - expected) <= _AGREE * size,
+        )
+        return bool((is_even & agrees).all())
+
+
+_TURNS = (1.0, -1.0, _NEAR)
+"""Sizes of the three perturbations of a variable, as parts of the usual one."""
+
+
 class _Point:
     """A component at its operating point, perturbed and put back."""
 
@@ -97,48 +131,45 @@ class _Point:
         self._values = self._all.read().copy()
         self._steps = _SIZE * np.maximum(1.0, np.abs(self._values))
 
-    def one_by_one(self) -> tuple[Matrix, Matrix]:
-        """Difference quotients upwards and downwards, shape (answers, names)."""
+    def one_by_one(self) -> Slopes:
         with self._put_back():
             at_rest = self._answers.read().copy()
-            up, down = (np.empty((len(at_rest), len(self.names))) for _ in range(2))
+            found = [np.empty((len(at_rest), len(self.names))) for _ in _TURNS]
             for k, name in enumerate(self.names):
                 value, step, perturbed = (
                     self._values[k],
                     self._steps[k],
                     RealBatch(self._component, [name]),
                 )
-                for sign, found in ((+1.0, up), (-1.0, down)):
-                    perturbed.values[0] = value + sign * step
+                for part, slopes in zip(_TURNS, found, strict=True):
+                    perturbed.values[0] = value + part * step
                     perturbed.write()
-                    found[:, k] = sign * (self._answers.read() - at_rest) / step
+                    slopes[:, k] = (self._answers.read() - at_rest) / (part * step)
                 perturbed.values[0] = value
                 perturbed.write()
-        return up, down
+        return Slopes(*found)
 
-    def together(self, pattern: NDArray[np.bool_]) -> tuple[Matrix, Matrix] | None:
+    def together(self, pattern: NDArray[np.bool_]) -> Slopes | None:
         """The same by groups of variables without a common answer; None where the pattern does not hold."""
-        up, down = (np.zeros(pattern.shape) for _ in range(2))
+        found = [np.zeros(pattern.shape) for _ in _TURNS]
         with self._put_back():
             at_rest = self._answers.read().copy()
             for group in _groups(pattern):
-                for sign, found in ((+1.0, up), (-1.0, down)):
-                    change = sign * (self._answer(sign, group) - at_rest)
+                for part, slopes in zip(_TURNS, found, strict=True):
+                    change = (self._answer(part, group) - at_rest) / part
                     for k in group.tolist():
-                        found[pattern[:, k], k] = change[pattern[:, k]] / self._steps[k]
+                        slopes[pattern[:, k], k] = change[pattern[:, k]] / self._steps[k]
             turns = np.random.default_rng(0).choice([-1.0, 1.0], len(self.names)) * self._steps
             change = (self._answer_at(turns) - self._answer_at(-turns)) / 2
-        expected = (up + down) / 2 @ turns
-        size = (
-            np.abs((up + down) / 2) @ np.abs(turns)
-            + np.abs(at_rest) * _ROUNDING
-            + _ROUNDING * _SIZE
-        )
-        return (up, down) if bool((np.abs(change - expected) <= _HOLDS * size).all()) else None
+        central = Slopes(*found).central
+        expected = central @ turns
+        size = np.abs(central) @ np.abs(turns) + np.abs(at_rest) * _ROUNDING + _ROUNDING * _SIZE
+        is_whole = bool((np.abs(change - expected) <= _HOLDS * size).all())
+        return Slopes(*found) if is_whole else None
 
-    def _answer(self, sign: float, group: NDArray[np.int64]) -> Matrix:
+    def _answer(self, part: float, group: NDArray[np.int64]) -> Matrix:
         turns = np.zeros(len(self.names))
-        turns[group] = sign * self._steps[group]
+        turns[group] = part * self._steps[group]
         return self._answer_at(turns)
 
     def _answer_at(self, turns: Matrix) -> Matrix:

@@ -9,23 +9,30 @@ from orchestrator.linear.models import slope_linearization as slopes
 
 
 @pytest.mark.parametrize(
-    ("up", "down", "alike"),
+    ("up", "down", "near", "alike"),
     [
-        (-1000.0, -1001.0, True),
-        (-1000.0, -1300.0, False),
-        (1e-4, -1e-4, True),
-        (0.02, -0.02, False),
-        (0.0, 0.0, True),
+        (-1000.0, -1001.0, -1000.5, True),
+        (-1000.0, -1300.0, -1150.0, False),
+        (1e-4, -1e-4, 0.0, True),
+        (0.02, -0.02, 0.0, False),
+        (0.0, 0.0, 0.0, True),
+        (-1000.0, -1000.0, -10000.0, False),  # a limit on both sides, within a tenth
+        (-950.0, -950.0, -1000.0, False),  # and just within the whole
+        (0.0, 0.0, 5.0, False),  # a bump
+        (-1000.0, -1050.0, -1022.5, True),  # curved
     ],
 )
-def test_slopes_that_differ_by_more_than_a_tenth_are_no_linear_model(up, down, alike, monkeypatch):
+def test_slopes_of_sides_or_sizes_that_differ_are_no_linear_model(
+    up, down, near, alike, monkeypatch
+):
     description = SimpleNamespace(states=("x",), rates=("der(x)",))
     exchange = SimpleNamespace(
         component=SimpleNamespace(name="a", description=description),
         inputs=SimpleNamespace(names=()),
         outputs=SimpleNamespace(names=()),
     )
-    found = SimpleNamespace(names=("x",), one_by_one=lambda: (np.array([[up]]), np.array([[down]])))
+    answers = slopes.Slopes(*(np.array([[answer]]) for answer in (up, down, near)))
+    found = SimpleNamespace(names=("x",), one_by_one=lambda: answers)
     monkeypatch.setattr(slopes, "_Point", lambda *_: found)
     monkeypatch.setattr(slopes, "linearize_component", lambda *_, **__: None)
     model = slopes.linearize_slopes(exchange, 0.0, 1e-4)

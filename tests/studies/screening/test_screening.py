@@ -15,7 +15,7 @@ from orchestrator.face.cli import main
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.linearization import Blocks, continuous
 from orchestrator.linear.spectra.mode_tracking import ModeSet
-from orchestrator.linear.spectra.modes import find_modes
+from orchestrator.linear.spectra.modes import find_modes, least_damped_first
 from orchestrator.studies.modes.modes import compute_modes
 from orchestrator.studies.operating_points.bench import PointBench, without_references
 from orchestrator.studies.operating_points.columns import Elements
@@ -708,3 +708,17 @@ def test_a_dask_cluster_screens_what_one_process_does(two_area, day, tmp_path, m
     for one, other in zip(alone.items, together.items, strict=True):
         assert one.record.eigenvalues.tobytes() == other.record.eigenvalues.tobytes()
         assert one.trajectories == other.trajectories
+
+
+def test_a_stabiliser_whose_limits_lie_within_the_perturbation_is_linear_nearer_by():
+    """Planted: a lead so steep that the usual perturbation of a speed runs into both limits of its output."""
+    case, steep = load_case("brazil7"), {"sg*.pss.T_1": 9.0, "sg*.pss.T_2": 0.005}
+    (prepared,) = case.prepare(["pss"], steep)
+    found = compute_modes(prepared)
+    assert "linear for small changes only" in " ".join(found.warnings)
+    with PointBench() as bench:
+        bench.master(prepared)
+        least = least_damped_first(find_modes(bench.linear_model().model))[0]
+    assert least.eigenvalue == pytest.approx(
+        least_damped_first(found.modes)[0].eigenvalue, rel=5e-3
+    )
