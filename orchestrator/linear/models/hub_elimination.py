@@ -75,6 +75,13 @@ class DenseHub:
     def given_out(self, y: Vector) -> Vector:
         return times(self.entering.T, y)
 
+    @property
+    def log_determinant(self) -> complex:
+        """Log of the rest's determinant; its imaginary part lacks whole turns."""
+        factors, rows = self.lu
+        flips = int((rows != np.arange(len(rows))).sum())
+        return complex(np.log(factors.diagonal().astype(complex)).sum() + 1j * np.pi * flips)
+
 
 @dataclass(frozen=True)
 class HubEquations:
@@ -254,6 +261,12 @@ class HubFactors:
             rest = b - self._product(found)
             left = float(np.abs(rest).max() / np.abs(right).max())
             yield left if np.isfinite(left) else np.inf
+
+    @property
+    def log_determinant(self) -> complex:
+        """Log det of the equations, by a hub that is whole; its imaginary part lacks whole turns."""
+        assert isinstance(self.port, DenseHub)
+        return self.blocks.log_determinant + self.port.log_determinant
 
     def _states_of(self, right: Vector, solve: Callable[[Vector], Vector]) -> Vector:
         columns = right if right.ndim == 2 else right[:, None]

@@ -137,17 +137,18 @@ class LinearModel:
 
     def __getstate__(self) -> dict[str, Any]:
         """All but the factorisation, which cannot be pickled or copied, and is made anew where it is needed."""
-        return {name: value for name, value in vars(self).items() if name not in ("settle", "_hub")}
+        return {name: value for name, value in vars(self).items() if name not in ("settle", "hub")}
 
     @cached_property
-    def _hub(self) -> HubEquations | None:
+    def hub(self) -> HubEquations | None:
+        """The equations with their hub set apart; None where there is none worth it."""
         return hub_equations(self.F, self.G, self.H, self.K)
 
     @property
     def is_searched_in_blocks(self) -> bool:
         """Tell if a search takes many vectors at once: in large models with a hub, whose dense rest is read once for
         all of them."""
-        return len(self.names) >= LEAST_IN_BLOCKS and self._hub is not None
+        return len(self.names) >= LEAST_IN_BLOCKS and self.hub is not None
 
     @property
     def number_of_states(self) -> int:
@@ -189,13 +190,13 @@ class LinearModel:
         """Return what solves (A − σI)ᴴ·x = b for many columns, close to an eigenvalue; None without a divided hub.
 
         Nothing has tried how accurate it is: what comes of it is to be proved by `shifted` elsewhere."""
-        factors = self._hub.untried_at(sigma) if self._hub and self.is_searched_in_blocks else None
+        factors = self.hub.untried_at(sigma) if self.hub and self.is_searched_in_blocks else None
         return factors.solve_adjoint if factors else None
 
     def _hub_at(self, sigma: complex) -> HubFactors | None:
-        if self._hub is None:
+        if self.hub is None:
             return None
-        return self._hub.near_at(sigma) if self.is_searched_in_blocks else self._hub.at(sigma)
+        return self.hub.near_at(sigma) if self.is_searched_in_blocks else self.hub.at(sigma)
 
 
 Indices = NDArray[np.int64]

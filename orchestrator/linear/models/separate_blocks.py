@@ -26,6 +26,10 @@ class BlockFactors(Protocol):
     def solve(self, right: Vector, transposed: str = "N") -> Vector:
         """(P − σ)⁻¹·right for "N", (P − σ)⁻ᴴ·right for "H"; right of shape (r, c)."""
 
+    @property
+    def log_determinant(self) -> complex:
+        """Log det(P − σ); its imaginary part lacks whole turns."""
+
 
 @dataclass(frozen=True)
 class InverseBlocks:
@@ -40,6 +44,43 @@ class InverseBlocks:
             taken = inverses.conj().transpose(0, 2, 1) if transposed == "H" else inverses
             found[own] = (taken @ given).reshape(right[own].shape)
         return found
+
+    @property
+    def log_determinant(self) -> complex:
+        """See `BlockFactors.log_determinant`."""
+        return -sum((_log_determinant(inverses) for inverses in self.stacks), 0j)
+
+
+@dataclass(frozen=True)
+class SparseFactors:
+    """A sparse factorisation of equations, in SciPy's words."""
+
+    lu: spla.SuperLU
+
+    def solve(self, right: Vector, transposed: str = "N") -> Vector:
+        found: Vector = self.lu.solve(right, transposed)
+        return found
+
+    @property
+    def log_determinant(self) -> complex:
+        """See `BlockFactors.log_determinant`."""
+        diagonal = self.lu.U.diagonal()
+        flips = _odd(self.lu.perm_r) ^ _odd(self.lu.perm_c)
+        return complex(np.log(diagonal.astype(complex)).sum() + 1j * np.pi * flips)
+
+
+def _log_determinant(matrices: Matrix) -> complex:
+    """Sum of log det of a stack of matrices."""
+    signs, logarithms = np.linalg.slogdet(matrices)
+    return complex(logarithms.sum() + 1j * np.angle(signs).sum())
+
+
+def _odd(permutation: NDArray[np.int32]) -> bool:
+    """Return whether a permutation is odd: an even number of its cycles lacks to its length."""
+    n = len(permutation)
+    cycles = sp.coo_array((np.ones(n), (np.arange(n), permutation)), shape=(n, n))
+    count, _ = sp.csgraph.connected_components(cycles, directed=False)
+    return bool((n - count) % 2)
 
 
 @dataclass(frozen=True)
@@ -56,10 +97,9 @@ class SeparateBlocks:
         """Factorise P − σ; None where a block is singular to the last digit."""
         try:
             if not self.stacks:
-                factors: BlockFactors = spla.splu(
-                    (self.whole - sigma * sp.diags_array(self.at_rest)).tocsc()
-                )
-                return factors
+                shifted = (self.whole - sigma * sp.diags_array(self.at_rest)).tocsc()
+                # without scaling the determinant is that of the factors
+                return SparseFactors(spla.splu(shifted, options={"Equil": False}))
             return InverseBlocks(tuple(self._inverses(sigma)))
         except (RuntimeError, np.linalg.LinAlgError):
             return None

@@ -178,7 +178,7 @@ def _whole(model: LinearModel, wanted: CriticalRegion) -> FoundModes:
 
 def _elsewhere(equations: ShiftedEquations, alone: Vector, found: ModeSet) -> int:
     known = 2 * int((found.eigenvalues.real > GROWING).sum())
-    return max(0, count_growing(equations, alone) - known)
+    return max(0, count_growing(equations, alone, found.eigenvalues) - known)
 
 
 def _near_zero(model: LinearModel, found: ModeSet) -> tuple[int, int]:

@@ -51,7 +51,7 @@ def ranks(part):
 
 
 def test_the_halves_of_a_line_have_few_ties():
-    hub = along_a_line()._hub.divided
+    hub = along_a_line().hub.divided
     found = list(ranks(hub.whole))
     assert len(found) >= 6
     # one branch, and the network's two states
@@ -61,7 +61,7 @@ def test_the_halves_of_a_line_have_few_ties():
 def test_solutions_are_close_and_refined_ones_are_those_of_the_matrix():
     model = along_a_line()
     shifted = model.A - SIGMA * np.eye(STATES)
-    factors = model._hub.near_at(SIGMA)
+    factors = model.hub.near_at(SIGMA)
     assert not isinstance(factors.port, DenseHub)
     rng = np.random.default_rng(1)
     b = rng.standard_normal((STATES, 3)) + 1j * rng.standard_normal((STATES, 3))
@@ -88,22 +88,22 @@ def test_critical_modes_are_those_of_the_full_spectrum():
 
 def test_ties_below_the_noise_of_perturbation_are_left_out_and_the_modes_keep_their_digits():
     model = along_a_line(noise=1e-9)
-    assert model._hub.divided is not None
+    assert model.hub.divided is not None
     full = [m for m in find_modes(model, *RANGE) if -0.1 <= m.damping_ratio <= 0.1]
     found = find_critical_modes(model, *RANGE, 0.1)
     assert [m.eigenvalue for m in found] == pytest.approx([m.eigenvalue for m in full], abs=1e-10)
 
 
 def test_a_network_that_does_not_fall_into_halves_is_not_divided():
-    assert system()._hub.divided is None
-    assert isinstance(system()._hub.near_at(SIGMA).port, DenseHub)
+    assert system().hub.divided is None
+    assert isinstance(system().hub.near_at(SIGMA).port, DenseHub)
 
 
 def test_ties_of_weight_that_are_left_out_are_noticed(monkeypatch):
     monkeypatch.setattr(divided_hub, "_NEGLIGIBLE", 3e-2)
     model = along_a_line()
-    assert model._hub.divided is not None
-    factors = model._hub.near_at(SIGMA)
+    assert model.hub.divided is not None
+    factors = model.hub.near_at(SIGMA)
     assert isinstance(factors.port, DenseHub)
     b = np.ones((STATES, 1), dtype=complex)
     assert np.allclose(model.A @ factors.solve(b) - SIGMA * factors.solve(b), b, atol=1e-9)

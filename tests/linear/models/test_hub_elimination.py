@@ -10,6 +10,12 @@ from orchestrator.linear.models.hub_elimination import hub_equations
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.critical_modes import find_critical_modes
 from orchestrator.linear.spectra.modes import eigenvalues, find_modes
+from orchestrator.linear.spectra.shifted_equations import (
+    GROWING,
+    FactorsByHub,
+    ShiftedEquations,
+    count_growing,
+)
 
 UNITS = 110
 STATES = 3 * UNITS + 2
@@ -65,17 +71,48 @@ def test_the_hub_is_the_voltages_and_the_networks_states_and_the_rest_falls_apar
 def test_both_equations_are_solved(sigma):
     model = system()
     shifted = model.A - sigma * np.eye(STATES)
-    solver = model._hub.at(sigma)
+    solver = model.hub.at(sigma)
     b = np.random.default_rng(1).standard_normal(STATES).astype(type(sigma))
     assert np.allclose(shifted @ solver.solve(b), b, atol=1e-9)
     assert np.allclose(shifted.conj().T @ solver.solve_adjoint(b), b, atol=1e-9)
+
+
+def test_determinants_and_solutions_by_blocks_are_those_of_the_sparse_equations(monkeypatch):
+    """As a count of growing modes asks them: a constant of the model apart, which is the same at each point."""
+    model, b = system(), np.random.default_rng(1).standard_normal((STATES, 2)).astype(complex)
+    equations, points = ShiftedEquations(model), (2e-3, 0.7j, -0.3 + 5j, 2e-3 + 40j)
+    by_hub = [equations.at(point) for point in points]
+    monkeypatch.setattr(hub_elimination, "LEAST_HUB", STATES)
+    sparse = ShiftedEquations(system())
+    apart = []
+    for point, factors in zip(points, by_hub, strict=True):
+        assert isinstance(factors, FactorsByHub)
+        other = sparse.at(point)
+        assert not isinstance(other, FactorsByHub)
+        for adjoint in (False, True):
+            assert np.allclose(
+                factors.solve(b, adjoint=adjoint), other.solve(b, adjoint=adjoint), atol=1e-9
+            )
+        apart.append(np.exp(factors.log_determinant - other.log_determinant))
+    assert np.allclose(apart, apart[0], rtol=1e-9)
+    assert np.abs(apart[0]) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("coupling", [0.02, 0.3])
+def test_growth_is_counted_by_blocks(coupling):
+    """Against all eigenvalues; 69 of them in one crowd turn the determinant more than once from point to point."""
+    model = system(coupling, planted=coupling < 0.1)
+    alone = np.linalg.eigvals(model.F.toarray())
+    growing = int((eigenvalues(model).real > GROWING).sum())
+    assert growing >= 2
+    assert count_growing(ShiftedEquations(model), alone) == growing
 
 
 def test_on_an_eigenvalue_of_a_unit_alone_the_whole_is_factorised():
     model = system()
     alone = complex(np.linalg.eigvals(model.F[:3, :3].toarray())[0])
     for sigma in (alone, alone * (1 + 1e-15)):
-        assert model._hub.at(sigma) is None
+        assert model.hub.at(sigma) is None
         b = np.ones(STATES, dtype=complex)
         x = model.shifted(sigma).solve(b)
         assert np.allclose(model.A @ x - sigma * x, b, atol=1e-8)

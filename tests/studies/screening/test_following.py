@@ -109,6 +109,19 @@ def test_growing_eigenvalues_are_counted():
         assert count_growing(ShiftedEquations(model), alone) == 2 * len(growing)
 
 
+MIRRORED = [*KNOWN, 0.1 + 3j, -0.0045 + 6.3j]
+"""The last is damped where a mode grows, and so close to that mode that both are unseen from afar."""
+
+
+@pytest.mark.parametrize("known", [[], [0.1 + 3j], MIRRORED, [4 + 3j, 9 + 0.1j]])
+def test_what_is_thought_to_be_known_leaves_the_count_as_it_is(known):
+    growing = [0.1 + 3j, 0.006 + 6.3j]
+    model, pairs = system([*KNOWN, *growing], 3, n=40), [-20 + 1j, -20 - 1j] * len(MIRRORED)
+    real = -np.linspace(1.0, 500.0, len(model.names) - len(pairs))
+    alone = np.concatenate([real, pairs])
+    assert count_growing(ShiftedEquations(model), alone, known) == 2 * len(growing)
+
+
 def test_a_pattern_that_does_not_hold_is_noticed():
     """Planted: an effect that the pattern of another operating point did not have."""
     prepared = prepare_one("two_area", "gfor")
@@ -119,9 +132,9 @@ def test_a_pattern_that_does_not_hold_is_noticed():
         names = (*description.states, *exchange.inputs.names)
         point = _Point(exchange.component, names, (*description.rates, *exchange.outputs.names))
         pattern = np.vstack([np.hstack([full.A_c, full.B_c]), np.hstack([full.C, full.D])]) != 0
-        up, down = point.together(pattern)
+        slopes = point.together(pattern)
         again = np.hstack([full.A_c, full.B_c])
-        assert ((up + down) / 2)[: len(again)] == pytest.approx(again, rel=1e-4, abs=1e-4)
+        assert slopes.central[: len(again)] == pytest.approx(again, rel=1e-4, abs=1e-4)
         i, k = np.argwhere(np.abs(full.A_c) > 1)[0]
         pattern[i, k] = False
         assert point.together(pattern) is None
