@@ -168,7 +168,7 @@ def _heights(poles: NDArray[np.complex128]) -> NDArray[np.float64]:
 
 
 def _with_known(alone: Vector, known: Vector) -> NDArray[np.complex128]:
-    """As many values as ``alone``, of which pairs nearest to known ones are replaced by these, both of a pair."""
+    """Replace pairs among ``alone`` by the known ones nearest to them, both of a pair; the number of values stays."""
     upper = alone[alone.imag > 0]
     lower, real = alone[alone.imag < 0], alone[alone.imag == 0]
     if len(upper) != len(lower):  # no real system's
