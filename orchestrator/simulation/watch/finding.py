@@ -41,6 +41,8 @@ NOT_JUDGED: Kind = "not_judged"
 TRIP: Kind = "trip"
 """Kind of finding of a relay that acted; what it does to the system, the others tell."""
 
+LIMIT: Kind = "active_limit"
+
 # of a test bench whose own capacitance makes the oscillation: the response tells nothing of the device in a grid
 BENCH_RESONANCE: Kind = "bench_resonance"
 
@@ -58,6 +60,7 @@ class Finding:
     # by name, with the unit in it or in the variable's: growth rates, frequencies, amplitudes, durations
     figures: Mapping[str, float] = field(default_factory=dict)
     represented: bool = True  # False of a limit that would act and that the model lacks
+    what: str = ""  # of a limit, what it is: "limiter of overexcitation"
 
     def as_json(self) -> dict[str, Any]:
         return {

@@ -194,6 +194,7 @@ def _finding(
         until=end,
         figures=figures,
         represented=limit.represented,
+        what=limit.name,
     )
 
 

@@ -10,7 +10,7 @@ from orchestrator.core.options import Option
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.output.report.short_texts import short
 from orchestrator.simulation.watch.confirmation import PERIODS
-from orchestrator.simulation.watch.finding import TRIP
+from orchestrator.simulation.watch.finding import LIMIT, TRIP
 from orchestrator.simulation.watch.own_trips import OWN_TRIPS
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.runs.after_events import lasting_changes, same_mode
@@ -50,7 +50,24 @@ KINDS = {
 
 def of_run(result: RunResult) -> ScenarioAnswer:
     """Return the answer of a run by what it showed, and by the eigenvalues before its events and after them."""
-    return _with_trips(_of_run(result), result)
+    return _with_trips(_with_limits(_of_run(result), result), result)
+
+
+def _with_limits(answer: ScenarioAnswer, result: RunResult) -> ScenarioAnswer:
+    """Return the answer with the limits that begin to act and still do at the end, which the modes do not have."""
+    if answer.good is False or answer.mode is None:
+        return answer
+    acting: dict[str, list[str]] = {}
+    for one in result.findings:
+        to_the_end = one.kind == LIMIT and one.represented and one.until is None
+        if to_the_end and one.time > 0:
+            acting.setdefault(one.what, []).append(one.component)
+    if not acting:
+        return answer
+    told = [f"the {what} of {few(names, _TRIPS_NAMED)}" for what, names in acting.items()]
+    acts = "acts" if len(told) == 1 and len(next(iter(acting.values()))) == 1 else "act"
+    remark = f"{few(told, 1)} {acts} at the end, and modes are those without it"
+    return replace(answer, remark=short("; ".join([remark, answer.remark]), LONGEST_REMARK))
 
 
 def _with_trips(answer: ScenarioAnswer, result: RunResult) -> ScenarioAnswer:

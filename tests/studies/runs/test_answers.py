@@ -74,7 +74,18 @@ def finding(kind, **more):
     [
         ([], True, "stable", "keeps synchronism and settles until 5 s"),
         # a limit that the model has
-        ([finding("active_limit")], True, "stable", "keeps synchronism"),
+        (
+            [finding("active_limit", what="limit", until=2.0)],
+            True,
+            "stable",
+            "keeps synchronism and settles until 5 s",
+        ),
+        (
+            [finding("active_limit", what="limit")],
+            True,
+            "stable",
+            "the limit of gfor acts at the end, and modes are those without it; keeps synchronism",
+        ),
         ([finding("active_limit", represented=False)], True, "not known", "repeat with EMT models"),
         ([finding("not_judged")], True, "not known", "not judged"),
         ([finding("loss_of_synchronism")], True, "UNSTABLE", "gfor: loses synchronism from 1 s"),
