@@ -47,7 +47,7 @@ def mill_case(
     text = write_case(WantedCase(files, out, models="phasor", replace=tuple(replace))).text
     text = text.replace('dyr = "mill.dyr"', f'{units}\ndyr = "mill.dyr"')
     name = "gfor2" if "2" in replace or machines != MACHINES else "sg2"
-    text = text.replace('"grid.line_*.p"', f'"grid.line_*.p", "grid.{name}.p"')
+    text = text.replace('"grid.line_*.p"', f'"grid.line_*.p", "grid.{name}*.p"')
     tables = "".join(
         "[[scenarios.tried.events]]\n" + "".join(f"{k} = {v!r}\n" for k, v in e.items())
         for e in events

@@ -5,8 +5,10 @@ from dataclasses import replace
 
 from fmus.grid.element_data import Line
 from orchestrator.cases.draft import Draft
+from orchestrator.cases.events.zero_sequence_transformers import unit_side
 from orchestrator.cases.form import schema
 from orchestrator.cases.networks.transformer_kinds import is_known_transformer
+from orchestrator.core.errors import Problem, QuestionTopic
 from orchestrator.core.options import Option
 from orchestrator.systems.coupling import events as coupled
 from orchestrator.systems.coupling.events import Event
@@ -102,6 +104,8 @@ def _is_within_a_transformer(draft: Draft, table: schema.LineFaultTable, where: 
         if is_known_transformer(line, of_file, groups):
             buses, kind = (line.from_bus, line.to_bus), "two"
     if not buses:
+        if line is not None:
+            _ask_whether_transformer(draft, line, where)
         return False
     lasts = "100 ms" if table.duration is None else f"{1e3 * table.duration:g} ms"
     draft.note(
@@ -112,6 +116,24 @@ def _is_within_a_transformer(draft: Draft, table: schema.LineFaultTable, where: 
         + f" '{buses[0]}, {lasts}, opens {table.line}, from {table.time:g} s' does",
     )
     return True
+
+
+def _ask_whether_transformer(draft: Draft, line: Line, where: str) -> None:
+    """Ask about a fault along what the network's file does not call a transformer, and is taken for one elsewhere."""
+    network, sequences = draft.network, draft.data.sequences if draft.data else None
+    if network is None or line.B or (sequences and sequences.transformers is not None):
+        return
+    side = unit_side(network, line)
+    if side is None:
+        return
+    bus = (line.from_bus, line.to_bus)[side]
+    text = (
+        f"{line.name} has no charging and alone leads to the units at {bus}: zero-sequence networks take it for a "
+        "transformer, along which no fault has a place, and this fault takes it for a line; put the fault at "
+        f"{line.from_bus} or {line.to_bus}, or give the line its charging B"
+    )
+    topic = QuestionTopic("a fault along what may be a transformer", line.name)
+    draft.found.questions.append(Problem(where, text, topic=topic))
 
 
 def _pole(

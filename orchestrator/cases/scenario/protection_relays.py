@@ -17,7 +17,7 @@ from orchestrator.cases.networks.psse.load_relay_records import (
 )
 from orchestrator.cases.networks.psse.raw_network import unit_labels
 from orchestrator.cases.networks.psse.relay_records import UnitRelay, unit_relays
-from orchestrator.cases.networks.step_ups import own_branches
+from orchestrator.cases.networks.step_ups import shared_branches
 from orchestrator.cases.scenario.measured_points import line_of_numbers
 from orchestrator.core.errors import InputError, Problem, QuestionTopic, few
 from orchestrator.core.options import Option
@@ -179,10 +179,13 @@ def _is_plant(draft: Draft, name: str) -> bool:
 
 
 def _high_sides(network: Network, units: Mapping[str, str]) -> dict[str, str]:
-    """Return the far bus of each unit's own transformer, where the code looks."""
-    own = own_branches(network, units)
-    ends = {line.name: {line.from_bus, line.to_bus} for line in network.lines if line.name in own}
-    return {own[name]: bus for name, both in ends.items() for bus in both - {units[own[name]]}}
+    """Return the far bus of the transformer that a unit has alone or shares with others, where the code looks."""
+    found: dict[str, str] = {}
+    behind = shared_branches(network, units)
+    for line in (line for line in network.lines if line.name in behind):
+        for unit in behind[line.name]:
+            found[unit] = line.to_bus if units[unit] == line.from_bus else line.from_bus
+    return found
 
 
 def _is_wind(draft: Draft, name: str) -> bool:

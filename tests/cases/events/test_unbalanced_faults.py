@@ -300,6 +300,20 @@ def test_a_fault_along_a_transformer_is_refused_and_the_remedy_works(case, name,
     ]
 
 
+def test_a_fault_along_what_is_taken_for_a_transformer_is_asked_about(tmp_path):
+    def asked(line, base):
+        fault = f'[[events]]\ntype = "line_fault"\ntime = "0.1 s"\nline = "{line}"\nat = "50 %"\n'
+        ready = prepared(tmp_path, fault, base)
+        return [one.text for one in ready.questions if f"{line} has no charging" in one.text]
+
+    bare = RADIAL.replace('groups.step_up = "YNd"\n', "")
+    (text,) = asked("step_up", bare)
+    assert "alone leads to the units at b2" in text or "alone leads to the units at b1" in text
+    assert "put the fault at b2 or b1, or give the line its charging B" in text
+    assert asked("step_up", bare.replace("X = 0.02 }", "X = 0.02, B = 0.001 }")) == []
+    assert asked("l23", bare) == []
+
+
 def test_a_short_circuit_of_one_phase_has_pandapowers_current(tmp_path):
     """Source, step-up transformer and line without loads; pandapower's c and K_T are those of IEC 60909."""
     text = RADIAL + '[[events]]\ntype = "bus_fault"\ntime = "0.1 s"\nbus = "b3"\nkind = "1-phase"\n'

@@ -6,7 +6,7 @@ from orchestrator.cases.case import load_case, with_protection
 from orchestrator.core.errors import CaseError
 from orchestrator.studies.runs.run import run_scenario
 from orchestrator.systems.coupling.bus_relays import Relays
-from tests.support.mill import RAW, mill_case
+from tests.support.mill import MACHINES, RAW, mill_case
 
 OWN_RELAY = "1 'VTGTPAT' 2 2 '1' 0.8 9 0.05 0"
 
@@ -19,8 +19,9 @@ def fault(time, duration, X=0.0):
 def prepared(tmp_path):
     """Events, a stop [s] and records → the case whose plant is a converter, protected by the code."""
 
-    def made(events=(), stop=2.0, records=(), raw=RAW):
-        case = load_case(mill_case(tmp_path, records, events, raw=raw, replace=["2"]))
+    def made(events=(), stop=2.0, records=(), raw=RAW, machines=MACHINES, replace=("2",)):
+        file = mill_case(tmp_path, records, events, raw=raw, replace=replace, machines=machines)
+        case = load_case(file)
         scenario = "tried" if events else "base"
         (ready,) = with_protection(case, "prc029").prepare([scenario], None, None, stop)
         return ready
@@ -85,6 +86,18 @@ def test_the_code_looks_at_the_high_side_of_a_plants_own_transformer(prepared):
     apart = RAW.replace("2, '1', 1, 1, 1, 60.0", "1, '1', 1, 1, 1, 60.0")
     apart = apart.replace("2, '2', 1, 1, 1, 20.0", "1, '2', 1, 1, 1, 20.0")
     assert {relay.bus for relay in prepared(raw=apart).relays} == {"bus_1"}
+
+
+def test_plants_that_share_a_transformer_are_looked_at_on_its_high_side(prepared):
+    apart = RAW.replace("2, '1', 1, 1, 1, 60.0", "1, '1', 1, 1, 1, 60.0")
+    apart = apart.replace("2, '2', 1, 1, 1, 20.0", "1, '2', 1, 1, 1, 20.0")
+    second = "2, '1', 40.0, 10.0, 100.0, -100.0"
+    plant = next(line for line in apart.splitlines() if line.startswith(second))
+    shared = apart.replace(plant, plant + "\n" + plant.replace("2, '1'", "2, '9'"))
+    machines = MACHINES + "2 'GENCLS' 9 4 2 /\n"
+    found = prepared(raw=shared, machines=machines, replace=["2_1", "2_9"]).relays
+    assert {relay.of for relay in found} == {"gfor2_1", "gfor2_9"}
+    assert {relay.bus for relay in found} == {"bus_1"}
 
 
 def test_at_another_rated_frequency_the_code_is_refused():

@@ -15,6 +15,10 @@ from orchestrator.cases.networks.psse.machine_model import (
 )
 from orchestrator.core.errors import few
 
+OF_NO_ORDER = dict.fromkeys(("REGFM_C1", "REGFMC1", "REGFMC1U"), "regfm_c1_phasor")
+"""Models of converters whose records cannot be read, as nobody tells the order of their fields, and what they are
+here."""
+
 LEAST_STRANGE = (
     2  # machines that one file has alone, in each, from which on the files may be of two networks
 )
@@ -128,6 +132,12 @@ def remedy_for(name: str, unit: str, *, approximate: bool) -> str:
     """Return what to do about a record that no part stands for; empty where it is of no grid-following converter.
 
     ``unit``: label of its machine's unit."""
+    model = OF_NO_ORDER.get(name)
+    if model is not None:
+        return (
+            f", of whose fields no public source has the order; write {replacement_of(unit)} and "
+            f'converter = "{model}", with its values in converter_parameters, and that model stands there'
+        )
     if not name.startswith(_FAMILIES) and name not in OF_PLANTS:
         return ""
     if name in OF_PLANTS:

@@ -94,6 +94,11 @@ def test_every_field_sets_a_parameter_of_the_model():
             "'WT4G1'",
             r"stands for WT4G1, a grid-following converter; write replace = ",
         ),
+        (
+            "'REGFMA1'",
+            "'REGFM_C1'",
+            r"of whose fields no public .* replace = \['3'\] .* converter = \"regfm_c1_phasor\"",
+        ),
     ],
 )
 def test_what_cannot_be_taken_over(old, new, words, tables):
