@@ -1,6 +1,5 @@
 """How far a certificate's criteria are from their limits: the same figure for the norm and for every code."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
@@ -30,9 +29,8 @@ def narrowest(margins: Sequence[Margin]) -> Margin | None:
 
 
 def margin_of(finding: RowFinding) -> str:
-    """A criterion's margin in words; its text begins with the value and the unit of both."""
-    unit = re.match(r"[-+.\de]+ (pu|Hz|s)\b", finding.text)
-    return margin_text(finding.margin, finding.limit, finding.value, unit[1] if unit else "")
+    """A criterion's margin in words."""
+    return margin_text(finding.margin, finding.limit, finding.value, finding.unit)
 
 
 def margin_text(

@@ -20,7 +20,8 @@ def row(name):
 
 
 def criterion(name, value, limit, margin, *, accepted):
-    return RowFinding(name, "rule", "code", value, limit, margin, accepted, f"{value} pu away")
+    text = f"{value} pu away"
+    return RowFinding(name, "rule", "code", value, limit, margin, accepted, text, "pu")
 
 
 VERDICTS = [

@@ -134,8 +134,6 @@ _PATTERNS = {"match", "search", "fullmatch", "findall", "finditer", "sub"}
 
 ALLOWED = {
     "orchestrator/simulation/federation/helics_calls.py": 1,  # what the library of HELICS says
-    # the unit of a finding's figure, as long as records of certificates have none
-    "orchestrator/studies/certification/margins.py": 1,
 }
 """Files that may look into a text, and how often."""
 

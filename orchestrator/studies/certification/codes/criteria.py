@@ -50,9 +50,10 @@ def _finding(
     limit: float,
     text: str,
     *,
+    unit: str = "pu",
     at_most: bool = True,
 ) -> RowFinding:
-    """A comparison; a value that is no number is not accepted."""
+    """A comparison; a value that is no number is not accepted. ``unit``: of the value and of its limit."""
     good = bool(value <= limit) if at_most else bool(value >= limit)
     scale = abs(limit) or 1.0
     margin = (limit - value) / scale if at_most else (value - limit) / scale
@@ -65,6 +66,7 @@ def _finding(
         margin=_number(margin),
         accepted=good,
         text=text,
+        unit=unit,
     )
 
 
@@ -235,7 +237,7 @@ def responds_within(event: int, sign: int, longest: float, share: float = 0.9) -
             else "it does not respond against the jump"
         )
         rule = f"{share:.0%} of the first change within {1e3 * longest:g} ms"
-        return _finding(f"speed at {time:g} s", rule, CODE, taken, longest, text)
+        return _finding(f"speed at {time:g} s", rule, CODE, taken, longest, text, unit="s")
 
     return judge
 
@@ -276,7 +278,7 @@ def stays_within(low: float, high: float, longest: float) -> Judge:
         taken = _longest(outside) * float(row.times[1] - row.times[0])
         text = f"{taken:.3f} s; {float(np.nanmin(v)):.3f} to {float(np.nanmax(v)):.3f} pu"
         rule = f"v is outside of {low:g} to {high:g} pu for at most {longest:g} s"
-        return _finding("voltage", rule, CODE, taken, longest, text)
+        return _finding("voltage", rule, CODE, taken, longest, text, unit="s")
 
     def bands(row: MeasuredRow) -> list[Band]:
         ends = row.times[[0, -1]]
@@ -307,6 +309,7 @@ def frequency_settles() -> Judge:
             moved,
             CALM,
             f"{moved:.3g} Hz, at {float(np.mean(part)):.3f} Hz",
+            unit="Hz",
         )
 
     return judge
@@ -330,6 +333,7 @@ def frequency_against_power() -> Judge:
             float(np.sign(more)) * away,
             SIDE,
             f"{away:+.3f} Hz at {more:+.3f} pu",
+            unit="Hz",
         )
 
     return judge
@@ -366,7 +370,8 @@ def inertia(event: int, rate: float, lasts: float, least: float) -> Judge:
         energy = float(np.sum(0.5 * (change[1:] + change[:-1])) * (row.times[1] - row.times[0]))
         H = energy * row.f_n / (2 * abs(rate) * lasts)
         rule = f"H = f_n·ΔE/(2·{abs(rate):g} Hz/s·{lasts:g} s) is at least {least:g} s"
-        return _finding(f"inertia at {time:g} s", rule, CODE, H, least, f"{H:.2f} s", at_most=False)
+        name = f"inertia at {time:g} s"
+        return _finding(name, rule, CODE, H, least, f"{H:.2f} s", unit="s", at_most=False)
 
     return judge
 

@@ -1,7 +1,6 @@
 """Records of the rows on the test bench in the files of a certificate: figures, responses, chapters of the page."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
 from html import escape
 from typing import Any
 
@@ -67,7 +66,7 @@ def _row(v: RowVerdict, c: Certificate) -> dict[str, Any]:
         "judged": v.is_judged,
         "accepted": v.accepted,
         "unknown": v.unknown,
-        "criteria": [asdict(f) for f in v.findings],
+        "criteria": [f.recorded for f in v.findings],
         "findings": c.results[v.row.name].findings,
     }
 

@@ -3,7 +3,7 @@
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType
@@ -74,7 +74,8 @@ class RowFinding:
 
     ``origin``: ``code`` where the number is the code's, ``reading`` where the code gives none and this program's is
     taken; ``value``, ``limit``: what was measured and what it is compared with; None where there is no such number;
-    ``margin``: how far the value is on the good side of the limit, in parts of the limit (negative: on the bad side).
+    ``margin``: how far the value is on the good side of the limit, in parts of the limit (negative: on the bad side);
+    ``unit``: of value and limit; "" where they count something.
     """
 
     criterion: str
@@ -85,6 +86,12 @@ class RowFinding:
     margin: float | None
     accepted: bool | None
     text: str
+    unit: str = ""
+
+    @property
+    def recorded(self) -> dict[str, Any]:
+        """The entry of a certificate's record, without the unit: those of earlier versions would not come out anew."""
+        return {key: value for key, value in asdict(self).items() if key != "unit"}
 
 
 # A criterion: the response of a row → whether it is met

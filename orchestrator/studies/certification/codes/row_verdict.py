@@ -153,4 +153,5 @@ def _ended_early(result: BenchResult, measured: MeasuredRow, stop: float) -> Row
         margin=None,
         accepted=False,
         text="; ".join(measured.faults) or f"the run ended at {ended:g} s",
+        unit="s",
     )

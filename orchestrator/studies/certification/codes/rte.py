@@ -146,6 +146,7 @@ def stays_inside(
             margin=least if np.isfinite(least) else None,
             accepted=bool(worst <= 0),
             text=text,
+            unit="pu",
         )
 
     def bands(row: MeasuredRow) -> list[Band]:

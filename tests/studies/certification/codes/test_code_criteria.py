@@ -1,5 +1,6 @@
 """The criteria of the codes on responses whose answers are known."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from orchestrator.studies.certification.codes import criteria as c
 from orchestrator.studies.certification.codes.all_codes import AREAS, CODES, MISO, longest
-from orchestrator.studies.certification.codes.bench_point import BenchResult
+from orchestrator.studies.certification.codes.bench_point import INTERVAL, RECORDED, BenchResult
 from orchestrator.studies.certification.codes.measured import MeasuredRow, over_a_period
 from orchestrator.studies.certification.codes.programme import jumps, last_machine, ramps, weakening
 from orchestrator.studies.certification.codes.row_verdict import judge_row
@@ -328,3 +329,19 @@ def test_the_load_after_the_last_machine_is_an_impedance(voltage, exponent, acce
     signals = {**row.signals, "duplicate.p": row.signals["p"], "source.p": np.where(gone, 0.0, 0.6)}
     found = c.meets_load()(MeasuredRow(row.times, signals, 60.0, (1.0,), ()))
     assert found.accepted is accepted
+
+
+@pytest.mark.parametrize("key", ["miso", "ercot", "fingrid"])
+def test_the_unit_of_a_figure_is_that_of_its_text(key):
+    """A text that begins with the value says its unit next; the margin's unit would be another one in silence."""
+    code, seen = CODES[key], set()
+    for row in code.rows:
+        times = np.arange(0, row.programme(60.0).stop + INTERVAL, INTERVAL)
+        still = dict.fromkeys(RECORDED, np.ones(times.shape))
+        for found in judge_row(row, BenchResult(row.name, times, still), 60.0).findings:
+            begins = re.match(r"[-+.\de]+ (pu|Hz|s)\b", found.text)
+            if begins:
+                seen.add((found.criterion.split(" at ")[0], begins[1]))
+                assert found.unit == begins[1], found
+            assert "unit" not in found.recorded
+    assert len(seen) >= 3
