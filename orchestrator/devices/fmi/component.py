@@ -25,6 +25,8 @@ class Component(Protocol):
     set_real: Any
     get_real: Any
     do_step: Any
+    # as fmi2SetFMUstate, callable from C; None where only `restore_state` restores
+    set_state: Any
     # as ``many_steps`` of many_steps.h, callable from C; None where each step is a call of its own
     many_steps: Any
 
@@ -124,6 +126,7 @@ class Derived(Closing):
 
     held_states: tuple[str, ...] = ()
     many_steps: Any = None
+    set_state: Any = None
 
     def takes_many(self, steps: ctypes.Structure) -> bool:
         return self.many_steps is not None
@@ -158,6 +161,12 @@ class Derived(Closing):
         return dict(zip(batch.names, batch.read().tolist(), strict=True))
 
 
+def address_of(numbers: NDArray[Any]) -> int:
+    """Return where an array's numbers begin. NumPy's ``ctypes.data`` says the same, and imports a module each time."""
+    address: int = numbers.__array_interface__["data"][0]
+    return address
+
+
 class RealBatch:
     """Real variables of one component that are read or written together, without any copying.
 
@@ -182,7 +191,7 @@ class RealBatch:
             component.pointer,
             ctypes.addressof(self._references),
             len(self.names),
-            self.values.ctypes.data,
+            address_of(self.values),
         )
         self.component = component
 

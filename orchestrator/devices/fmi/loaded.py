@@ -168,12 +168,12 @@ class LoadedComponent(Derived):
         prototype = ctypes.CFUNCTYPE(ctypes.c_int, address, address, size, address)
         self.set_real = prototype(("fmi2SetReal", library))
         self.get_real = prototype(("fmi2GetReal", library))
-        self._set_state = None
+        self.set_state = None
         if (
             self._ours and self.description.can_save_state
         ):  # thousands of calls where FMUs are perturbed
             two = ctypes.CFUNCTYPE(ctypes.c_int, address, address)
-            self._set_state = two(("fmi2SetFMUstate", library))
+            self.set_state = two(("fmi2SetFMUstate", library))
         self.do_step = ctypes.CFUNCTYPE(ctypes.c_int, address, real, real, flag)(
             ("fmi2DoStep", library)
         )
@@ -310,12 +310,12 @@ class LoadedComponent(Derived):
         return self._call("fmi2GetFMUstate", self._fmu.getFMUState)
 
     def restore_state(self, state: Any) -> None:
-        if self._set_state is None:
+        if self.set_state is None:
             self._call("fmi2SetFMUstate", self._fmu.setFMUState, state)
             return
         self._messages.clear()
         with calls:
-            status = self._set_state(self.pointer, state)
+            status = self.set_state(self.pointer, state)
         self.check(status, "fmi2SetFMUstate")
         check_log(self.name, self._texts, "fmi2SetFMUstate")
 

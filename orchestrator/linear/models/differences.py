@@ -2,12 +2,15 @@
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from orchestrator.core.arrays import Matrix
+from orchestrator.core.arrays import Matrix, Vector
 from orchestrator.devices.fmi.component import Component, RealBatch
+from orchestrator.linear.models.answers_to_moves import Moves, answers_to_moves
 
 # change of a state in a step [of max(1, |value|)] up to which the component rests
 RESTS = 1e-9
@@ -56,51 +59,57 @@ class PerturbedStep:
         ``size``: of the perturbation, relative to max(1, |value|); ``rates`` are read before the step; ``unstepped``:
         those of ``varied`` after which no step is done; the caller gives their columns of d(x⁺)."""
         component, names = self.component, self.names
-        perturbed = RealBatch(component, names)
-        z_0 = perturbed.read().copy()
-        after, outputs, slopes = (
-            RealBatch(component, group) for group in (self.states, self.exits, rates)
+        moved, after, outputs = self._batches
+        slopes = RealBatch(component, rates)
+        values = moved.read()[list(varied)]
+        sizes = size * np.maximum(1.0, np.abs(values))
+        signs = [
+            _allowed_signs(component, names[place], value, step)
+            for place, value, step in zip(varied, values.tolist(), sizes.tolist(), strict=True)
+        ]
+        first = np.array([each[0] for each in signs])
+        both = np.flatnonzero([len(each) == 2 for each in signs])
+        stepped = np.array([place not in unstepped for place in varied], dtype=bool)
+        places = np.array(varied, dtype=np.int64)
+        moves = Moves(
+            moved,
+            np.concatenate([places, places[both]]),
+            np.concatenate([values + first * sizes, values[both] - sizes[both]]),
+            np.concatenate([stepped, stepped[both]]),
+            before=(outputs, slopes),
+            after=after,
         )
-        columns = tuple(
-            np.zeros((len(varied), len(batch.names))) for batch in (after, outputs, slopes)
-        )
-        upwards = tuple(np.zeros_like(column) for column in columns)
         saved = component.save_state()
         try:
-            outputs_0, slopes_0 = outputs.read().copy(), slopes.read().copy()
-            component.step(self.time, self.step_size)
-            after_0 = after.read().copy()
-            component.restore_state(saved)
-            for k, place in enumerate(varied):
-                value = z_0[place]
-                step = size * max(1.0, abs(value))
-                signs = _allowed_signs(component, names[place], value, step)
-                for sign in signs:
-                    perturbed.values[place] = value + sign * step
-                    perturbed.write_one(place)
-                    for batch, column in zip((outputs, slopes), columns[1:], strict=True):
-                        column[k] += sign * batch.read()
-                    if place not in unstepped:
-                        component.step(self.time, self.step_size)
-                        columns[0][k] += sign * after.read()
-                    if sign == signs[0]:
-                        upwards[0][k] = sign * (after.values - after_0)
-                        upwards[1][k] = sign * (outputs.values - outputs_0)
-                        upwards[2][k] = sign * (slopes.values - slopes_0)
-                    component.restore_state(saved)
-                if len(signs) == 1:
-                    for column, at_rest in zip(
-                        columns, (after_0, outputs_0, slopes_0), strict=True
-                    ):
-                        column[k] -= signs[0] * at_rest
-                for column in columns:
-                    column[k] /= len(signs) * step
-                for column in upwards:
-                    column[k] /= step
+            at_rest = self._at_rest(slopes, saved)
+            answers = answers_to_moves(component, moves, saved, self.time, self.step_size)
         finally:
             component.restore_state(saved)
             component.free_state(saved)
+        every = zip((answers.after, *answers.before), at_rest, strict=True)
+        columns, upwards = zip(
+            *(_quotients(each, rest, first, sizes, both) for each, rest in every), strict=True
+        )
+        for column in (columns[0], upwards[0]):
+            column[~stepped] = 0.0
         return Differences(*(column.T for column in (*columns, *upwards)))
+
+    @cached_property
+    def _batches(self) -> tuple[RealBatch, RealBatch, RealBatch]:
+        """What is moved, the states, and the outputs."""
+        groups = (self.names, self.states, self.exits)
+        moved, states, outputs = (RealBatch(self.component, names) for names in groups)
+        return moved, states, outputs
+
+    def _at_rest(self, slopes: RealBatch, saved: Any) -> tuple[Matrix, Matrix, Matrix]:
+        """States after a step, outputs and rates before it where nothing is moved; the component is put back."""
+        _, after, outputs = self._batches
+        outputs.read()
+        slopes.read()
+        self.component.step(self.time, self.step_size)
+        after.read()
+        self.component.restore_state(saved)
+        return after.values.copy(), outputs.values.copy(), slopes.values
 
     def moves_at_rest(self) -> bool:
         """Return whether a step from the operating point itself changes a state by more than `RESTS`."""
@@ -156,6 +165,27 @@ class PerturbedStep:
         finally:
             component.restore_state(saved)
             component.free_state(saved)
+
+
+def _quotients(
+    answers: Matrix, at_rest: Vector, first: Vector, sizes: Vector, both: NDArray[np.int64]
+) -> tuple[Matrix, Matrix]:
+    """Central difference quotients, and those of the first direction alone; a row for each variable.
+
+    Answers are those in the first direction, then those in the other of the variables that have ``both``."""
+    count = len(sizes)
+    other = np.empty((count, len(at_rest)))
+    other[:] = at_rest
+    other[both] = answers[count:]
+    width = sizes.copy()
+    width[both] *= 2
+    central = np.subtract(answers[:count], other, out=other)
+    central *= first[:, None]
+    central /= width[:, None]
+    one_sided = answers[:count] - at_rest
+    one_sided *= first[:, None]
+    one_sided /= sizes[:, None]
+    return central, one_sided
 
 
 def _allowed_signs(component: Component, name: str, value: float, step: float) -> tuple[float, ...]:
