@@ -9,9 +9,10 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from orchestrator.core.arrays import Matrix
 from orchestrator.core.errors import AnalysisError
 from orchestrator.core.options import Option, command
-from orchestrator.linear.models.blocks import Blocks, linearize_within
+from orchestrator.linear.models.blocks import MANY_INPUTS, Blocks, linearize_within
 from orchestrator.linear.models.delays import DelayLine, continuous_line, delay_line
 from orchestrator.linear.models.linear_model import DELAYED, HELD, Equations, Indices, LinearModel
 from orchestrator.systems.coupling.master import Master
@@ -88,7 +89,7 @@ def compose(blocks: Blocks, schedule: Schedule, *, within_period: bool = False) 
             A, B, _ = blocks.over_step(name)
             equations.next_state(x, x, A, u, B)
             newest[blocks.window[name]] = p + np.arange(p)[blocks.window[name]]
-            equations.output(newest[blocks.window[name]], x, c.C @ A, u, c.C @ B + c.D)
+            equations.output(newest[blocks.window[name]], x, c.C @ A, u, _after_step(c.C, B) + c.D)
     for k, i in enumerate(memory):
         equations.next_state(
             slice(n + k, n + k + 1), slice(0, 0), np.zeros((1, 0)), newest[i : i + 1], np.eye(1)
@@ -106,6 +107,16 @@ def compose(blocks: Blocks, schedule: Schedule, *, within_period: bool = False) 
         blocks.how,
         wires=[*wired, *blocks.inputs],
     )
+
+
+def _after_step(C: Matrix, B: Matrix) -> Matrix:
+    """C·B; half of the columns of a large network's B are those of idle inputs."""
+    if B.shape[1] < MANY_INPUTS:
+        return C @ B
+    used = np.flatnonzero(B.any(axis=0))
+    found = np.zeros((len(C), B.shape[1]))
+    found[:, used] = C @ B[:, used]
+    return found
 
 
 def _delay_lines(
