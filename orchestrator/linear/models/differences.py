@@ -113,16 +113,20 @@ class PerturbedStep:
 
     def moves_at_rest(self) -> bool:
         """Return whether a step from the operating point itself changes a state by more than `RESTS`."""
-        before, after = self._states_around(np.zeros(len(self.inputs)))
+        before, after = self._states_around(self.inputs, np.zeros(len(self.inputs)))
         return bool((np.abs(after - before) > RESTS * np.maximum(1.0, np.abs(before))).any())
 
     def response(self, turns: Matrix) -> Matrix:
         """States' central difference after steps with all inputs moved at once by ±``turns``, shape (n,)."""
-        return (self._states_around(turns)[1] - self._states_around(-turns)[1]) / 2
+        return self._response(self.inputs, turns)
+
+    def response_to_states(self, turns: Matrix) -> Matrix:
+        """States' central difference after steps with all states moved at once by ±``turns``, shape (n,)."""
+        return self._response(self.states, turns)
 
     def sizes(self, size: float) -> Matrix:
         """Perturbation of each input, for a size relative to max(1, |value|)."""
-        return size * np.maximum(1.0, np.abs(RealBatch(self.component, self.inputs).read()))
+        return self.all_sizes(size)[len(self.states) :]
 
     def all_sizes(self, size: float) -> Matrix:
         """Perturbation of each state and input, for a size relative to max(1, |value|)."""
@@ -150,16 +154,20 @@ class PerturbedStep:
             component.free_state(saved)
         return answers[0], answers[1]
 
-    def _states_around(self, turns: Matrix) -> tuple[Matrix, Matrix]:
-        """States before and after a step whose inputs are moved; the component is put back."""
+    def _response(self, names: Sequence[str], turns: Matrix) -> Matrix:
+        upwards, downwards = (self._states_around(names, way * turns)[1] for way in (1.0, -1.0))
+        return (upwards - downwards) / 2
+
+    def _states_around(self, names: Sequence[str], turns: Matrix) -> tuple[Matrix, Matrix]:
+        """States before and after a step before which some variables are moved; the component is put back."""
         component = self.component
-        inputs, states = RealBatch(component, self.inputs), RealBatch(component, self.states)
+        moved, states = RealBatch(component, names), RealBatch(component, self.states)
         before = states.read().copy()
         saved = component.save_state()
         try:
-            inputs.read()
-            inputs.values += turns
-            inputs.write()
+            moved.read()
+            moved.values += turns
+            moved.write()
             component.step(self.time, self.step_size)
             return before, states.read().copy()
         finally:

@@ -1,5 +1,7 @@
 """Very many inputs: a step's answer to them follows from that to states and from the rates, if steps prove it."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -81,6 +83,60 @@ def test_rates_that_do_not_belong_to_the_steps_are_not_believed():
         wrong = Other(step.component, step.inputs, step.exits, step.time, step.step_size)
         assert differences_by_rates(wrong, PERTURBATIONS[0], with_slopes=False) is None
         assert differences_by_rates(step, PERTURBATIONS[0], with_slopes=False) is not None
+
+
+class Counted(PerturbedStep):
+    """Notes how many variables are moved without a step."""
+
+    def differences(self, varied, size, rates=(), unstepped=()):
+        vars(self).setdefault("unstepped", []).append(len(unstepped))
+        found = super().differences(varied, size, rates, unstepped)
+        if len(found.slopes):
+            found.slopes[:, :2] *= vars(self).get("wrong", 1.0)
+        return found
+
+
+def counted(kind, monkeypatch):
+    monkeypatch.setattr(held_response, "MANY_STATES", 2)
+    master, step = step_of(kind, {"x_0": 0.3}, 0.3)
+    return master, Counted(step.component, ["u"], ["y"], 0.0, H)
+
+
+def test_many_states_have_the_answer_of_their_integrator_without_a_step_of_each(monkeypatch):
+    master, step = counted("chain", monkeypatch)
+    with master:
+        small, large = differences_by_rates(step, PERTURBATIONS[0], with_slopes=False)
+        rest = RealBatch(step.component, ("x_1", "x_2", "u")).read().tolist()
+    rates = np.array([[-100.0, 0.0, 100.0], [250.0, -250.0, 0.0], [0.0, 0.0, 0.0]])
+    part, parts = 1e-4 * rates, round(H / 1e-4)
+    terms = (np.linalg.matrix_power(part, k) / math.factorial(k) for k in range(5))
+    expected = np.linalg.matrix_power(sum(terms), parts)[:2]
+    assert small.after == pytest.approx(expected, abs=1e-9)
+    assert small.after_up == pytest.approx(expected, abs=1e-9)
+    assert large.after is small.after
+    assert vars(step)["unstepped"] == [3]
+    assert rest == [0.3, 0.3, 0.3]
+
+
+@pytest.mark.parametrize(
+    ("kind", "wrong"),
+    [
+        ("held_chain", 1.0),  # a state that is held in a step makes no polynomial of the rates
+        ("chain", np.array([[1.0], [1 + 1e-5]])),  # rates of one state answer too much
+    ],
+)
+def test_many_states_are_stepped_one_by_one_where_their_rates_do_not_tell(kind, wrong, monkeypatch):
+    master, step = counted(kind, monkeypatch)
+    vars(step)["wrong"] = wrong
+    with master:
+        found = perturb(step, ()).small.after
+        monkeypatch.setattr(held_response, "MANY_MOVED", 100)
+        by_steps = perturb(step, ()).small.after
+    assert vars(step)["unstepped"][:2] == [
+        3,
+        1,
+    ]  # the proof failed: again, with steps of the states
+    assert found == pytest.approx(by_steps, abs=1e-9)
 
 
 def test_another_size_is_measured_where_it_is_answered_otherwise():

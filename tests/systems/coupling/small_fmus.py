@@ -36,6 +36,21 @@ def lag() -> Model:
     return m.build()
 
 
+def lag_chain(stepwise: bool = False) -> Model:
+    """T_1·ẋ₁ = u − x₁ and T_2·ẋ₂ = x₁ − x₂, y = x₂; x₂ may be held during a step, and move by its first rate then."""
+    m = ModelBuilder("small_held_chain" if stepwise else "small_chain", "Lags in a chain")
+    T_1 = m.parameter("T_1", 0.01, "s", "Time constant of the first lag")
+    T_2 = m.parameter("T_2", 0.004, "s", "Time constant of the second lag")
+    x_0 = m.parameter("x_0", 0.0, "1", "Initial value of both")
+    u = m.input("u", "1", "Input")
+    x_1 = m.state("x_1", x_0, "1", "Output of the first lag")
+    x_2 = m.state("x_2", x_0, "1", "Output of the second lag", stepwise=stepwise)
+    m.derivative(x_1, (u - x_1) / T_1)
+    m.derivative(x_2, (x_1 - x_2) / T_2)
+    m.output("y", x_2, "1", "Output of the second lag")
+    return m.build()
+
+
 def lag_factor(step_size: float, T: float, internal_step: float = 1e-4) -> float:
     """What is left of u − x after one communication step: the Runge-Kutta polynomial of each internal step."""
     parts = max(1, ceil(step_size / internal_step - 1e-9))
@@ -102,6 +117,8 @@ def power_source() -> Model:
 MODELS = {
     "integrator": integrator,
     "lag": lag,
+    "chain": lag_chain,
+    "held_chain": lambda: lag_chain(stepwise=True),
     "gain": gain,
     "started_gain": started_gain,
     "guarded_gain": guarded_gain,
