@@ -39,6 +39,9 @@ class Moves:
     steps: NDArray[np.bool_]
     before: tuple[RealBatch, RealBatch]
     after: RealBatch
+    # time, step_size: of the step [s]
+    time: float
+    step_size: float
 
 
 @dataclass(frozen=True)
@@ -71,10 +74,8 @@ class _Moves(ctypes.Structure):
     )
 
 
-def answers_to_moves(
-    component: Component, moves: Moves, saved: Any, time: float, step_size: float
-) -> Answers:
-    """Make all moves, each from the saved state [s]; the component is left in that state."""
+def answers_to_moves(component: Component, moves: Moves, saved: Any) -> Answers:
+    """Make all moves, each from the saved state; the component is left in that state."""
     count = len(moves.places)
     before, after = (
         tuple(np.zeros((count, len(batch.names))) for batch in group)
@@ -83,20 +84,13 @@ def answers_to_moves(
     answers = Answers((before[0], before[1]), after[0])
     library = None if component.set_state is None else _library()
     if library is None:
-        _in_python(component, moves, answers, saved, time, step_size)
+        _in_python(component, moves, answers, saved)
     else:
-        _in_c(library, component, moves, answers, saved, time, step_size)
+        _in_c(library, component, moves, answers, saved)
     return answers
 
 
-def _in_python(
-    component: Component,
-    moves: Moves,
-    answers: Answers,
-    saved: Any,
-    time: float,
-    step_size: float,
-) -> None:
+def _in_python(component: Component, moves: Moves, answers: Answers, saved: Any) -> None:
     moved, at_rest = moves.moved, moves.moved.values.copy()
     for k, place in enumerate(moves.places.tolist()):
         moved.values[place] = moves.values[k]
@@ -105,7 +99,7 @@ def _in_python(
         for batch, rows in zip(moves.before, answers.before, strict=True):
             rows[k] = batch.read()
         if moves.steps[k]:
-            component.step(time, step_size)
+            component.step(moves.time, moves.step_size)
             answers.after[k] = moves.after.read()
         component.restore_state(saved)
 
@@ -116,8 +110,6 @@ def _in_c(
     moves: Moves,
     answers: Answers,
     saved: Any,
-    time: float,
-    step_size: float,
 ) -> None:
     def into(batch: RealBatch, rows: Matrix) -> _Batch:
         return _Batch(batch.arguments[1], len(batch.names), address_of(rows))
@@ -137,8 +129,8 @@ def _in_c(
         component=component.pointer,
         **functions,
         saved=saved,
-        time=time,
-        step_size=step_size,
+        time=moves.time,
+        step_size=moves.step_size,
         before=(_Batch * 2)(*map(into, moves.before, answers.before)),
         after=into(moves.after, answers.after),
         references=moves.moved.arguments[1],
@@ -154,7 +146,7 @@ def _in_c(
             status = library.answers_to_moves(
                 ctypes.byref(asked), first, count, ctypes.byref(called)
             )
-        component.check(status, _CALLS.get(called.value, ""), time)
+        component.check(status, _CALLS.get(called.value, ""), moves.time)
 
 
 @cache

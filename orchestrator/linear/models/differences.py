@@ -78,11 +78,13 @@ class PerturbedStep:
             np.concatenate([stepped, stepped[both]]),
             before=(outputs, slopes),
             after=after,
+            time=self.time,
+            step_size=self.step_size,
         )
         saved = component.save_state()
         try:
             at_rest = self._at_rest(slopes, saved)
-            answers = answers_to_moves(component, moves, saved, self.time, self.step_size)
+            answers = answers_to_moves(component, moves, saved)
         finally:
             component.restore_state(saved)
             component.free_state(saved)

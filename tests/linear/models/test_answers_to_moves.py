@@ -47,10 +47,12 @@ def answers(component, places, values, steps):
         np.array(steps),
         before=(outputs, slopes),
         after=states,
+        time=0.0,
+        step_size=H,
     )
     saved = component.save_state()
     try:
-        return answers_to_moves(component, moves, saved, 0.0, H)
+        return answers_to_moves(component, moves, saved)
     finally:
         component.free_state(saved)
 
