@@ -46,7 +46,7 @@ class Moves:
 
 @dataclass(frozen=True)
 class Answers:
-    """What was read after each move, a row each; 0 where no step was made."""
+    """Values read around each move, a row each; 0 after a step that was not made."""
 
     before: tuple[Matrix, Matrix]
     after: Matrix

@@ -98,7 +98,7 @@ class PerturbedStep:
 
     @cached_property
     def _batches(self) -> tuple[RealBatch, RealBatch, RealBatch]:
-        """What is moved, the states, and the outputs."""
+        """All variables that are moved, the states, and the outputs."""
         groups = (self.names, self.states, self.exits)
         moved, states, outputs = (RealBatch(self.component, names) for names in groups)
         return moved, states, outputs
