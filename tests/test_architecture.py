@@ -215,6 +215,7 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
     Everybody may know the names, units and limits that models and bindings share: `PLAIN_DATA` holds no equations.
     """
     borrowers = {
+        "orchestrator.linear.models.answers_to_moves",
         "orchestrator.studies.black_box.bench",
         "orchestrator.systems.coupling.compiled_loop",
         "orchestrator.systems.coupling.wire_bank",
