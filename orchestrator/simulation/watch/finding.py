@@ -17,6 +17,7 @@ Kind = Literal[
     "failure",
     "misfit",
     "trip",
+    "stall",
     "bench_resonance",
 ]
 
@@ -42,6 +43,9 @@ TRIP: Kind = "trip"
 """Kind of finding of a relay that acted; what it does to the system, the others tell."""
 
 LIMIT: Kind = "active_limit"
+
+STALL: Kind = "stall"
+"""Kind of finding of a motor that stands still or nearly; what that does to the system, the others tell."""
 
 # of a test bench whose own capacitance makes the oscillation: the response tells nothing of the device in a grid
 BENCH_RESONANCE: Kind = "bench_resonance"

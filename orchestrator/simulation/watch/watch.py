@@ -26,6 +26,7 @@ from orchestrator.simulation.watch.response import (
 from orchestrator.simulation.watch.run_away import run_away, speed_signals, still_moving_away
 from orchestrator.simulation.watch.seen import Seen, Watcher, look_every, rescaled, unit
 from orchestrator.simulation.watch.settings import Settings
+from orchestrator.simulation.watch.stalls import stall_signals, stalls
 from orchestrator.simulation.watch.stretches import Stretch, stretches
 from orchestrator.simulation.watch.synchronism import angle_signals, lost_synchronism
 from orchestrator.simulation.watch.undisturbed import (
@@ -138,6 +139,7 @@ class Watch:
                 *angle_signals(prepared.system),
                 *speed_signals(prepared.system),
                 *own_trip_signals(prepared.system),
+                *stall_signals(prepared.system),
             ]
         )
         self._looks_at_records = every % prepared.record_every == 0 and not prepared.record_filtered
@@ -207,6 +209,7 @@ def judge_run(
         parts.insert(0, Stretch(0.0, happened[0]))
     found = [
         *own_trips(seen, system, settings),
+        *stalls(seen, system, settings),
         *undisturbed,
         *above_declared(seen, system),
         *active_limits(seen, system, settings),

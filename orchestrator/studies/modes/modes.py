@@ -25,6 +25,7 @@ from orchestrator.devices.binding.misfits import Misfit
 from orchestrator.linear.doubts.examination import examine
 from orchestrator.linear.doubts.excitation_limiters import limiter_warnings
 from orchestrator.linear.doubts.external_exciters import settled_warnings, start_warnings
+from orchestrator.linear.doubts.motor_starts import motor_warnings
 from orchestrator.linear.models.component_linearization import ComponentLinearization
 from orchestrator.linear.models.device_start import misfits_of, sentences
 from orchestrator.linear.models.linear_model import IDENTIFIED, LinearModel
@@ -192,7 +193,10 @@ def linearised(
     directional: bool = False,
 ) -> "Linearised":
     """The same before its eigenvalues are computed."""
-    misfits, said = misfits_of(master), (*start_warnings(master), *limiter_warnings(master))
+    misfits, said = (
+        misfits_of(master),
+        (*start_warnings(master), *limiter_warnings(master), *motor_warnings(master)),
+    )
     point = find_operating_point(master)
     said += settled_warnings(master)
     blocks = Blocks(master, derivatives=True, directional=directional)

@@ -25,6 +25,7 @@ from orchestrator.devices.fmi.protection import Protection, missing
 from orchestrator.linear.doubts.coupling_growth import coupling_growth
 from orchestrator.linear.doubts.excitation_limiters import limiter_warnings
 from orchestrator.linear.doubts.external_exciters import start_warnings
+from orchestrator.linear.doubts.motor_starts import motor_warnings
 from orchestrator.linear.models.device_start import misfits_of, sentences
 from orchestrator.linear.models.linearization import Blocks, compose
 from orchestrator.linear.models.state_access import obstacle
@@ -194,7 +195,12 @@ def _run(
             modes = boxes(prepared, master, frequency_range)
         elif reasons:
             misfits, modes = misfits_of(master), unknown_modes(prepared, reasons)
-            started = (*sentences(misfits), *start_warnings(master), *limiter_warnings(master))
+            started = (
+                *sentences(misfits),
+                *start_warnings(master),
+                *limiter_warnings(master),
+                *motor_warnings(master),
+            )
             modes = replace(modes, warnings=(*started, *modes.warnings), misfits=misfits)
         else:
             modes = modes_of(prepared, master, frequency_range)

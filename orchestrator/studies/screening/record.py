@@ -21,10 +21,10 @@ class WantedRuns:
 
 @dataclass(frozen=True)
 class RelayTrip:
-    """A relay that acted in the run of an outage.
+    """A relay that acted in the run of an outage, or a motor that stalled.
 
-    ``of``: the unit, load or bus that it protects; ``record``: its record, "" of a trip inside a model; ``time``: when
-    its breaker opened [s]; ``seen``: voltage [pu] or frequency [Hz] when it tripped, inside a model the power that
+    ``of``: the unit, load or bus that it protects; ``record``: its record, "" of what happens inside a model; ``time``:
+    when its breaker opened [s]; ``seen``: voltage [pu] or frequency [Hz] when it tripped, inside a model the power that
     goes off [MW]."""
 
     of: str

@@ -36,7 +36,7 @@ def runs_sentence(summary: Summary) -> str:
         return ""
     told = []
     for items, what, of in (
-        (summary.tripping, "relays or models trip", _trips_of),
+        (summary.tripping, "relays or models trip, or motors stall", _trips_of),
         (summary.gone_wrong, "the system does not hold", _wrong_of),
     ):
         if items:

@@ -3,6 +3,7 @@
 import pytest
 
 from orchestrator.cases.case import load_case
+from orchestrator.studies.modes.modes import compute_modes
 from orchestrator.studies.runs.answer_of_run import of_run
 from orchestrator.studies.runs.run import run_scenario
 from tests.support.mill import mill_case
@@ -62,3 +63,41 @@ def test_a_share_that_comes_back_is_told_as_back_and_one_that_stays_as_off(run):
     most, left = off.figures["power_mw"], off.figures["off_at_the_end_mw"]
     assert 5 < most < 40
     assert left == pytest.approx(most / 2, rel=0.05)
+
+
+def stalls(result):
+    return [finding for finding in result.findings if finding.kind == "stall"]
+
+
+def with_torque(power, VI=0.0):
+    """Return the motor whose load's torque goes with a power of the speed."""
+    return MOTOR.format(VI=VI).removesuffix("2 0") + f"{power} 0"
+
+
+def test_a_motor_that_stalls_is_told_with_its_time_and_power(run):
+    """The torque of its load is constant: after a fault of 1.5 s it stands still, and stays so."""
+    result = run(fault(1.5, X=0.0), stop=4.0, records=[with_torque(0)])
+    (told,) = stalls(result)
+    assert (told.component, told.variable) == ("motor2_1", "speed")
+    assert 1.0 < told.time < 2.5
+    assert told.figures["power_mw"] == pytest.approx(60.0, rel=1e-6)
+    assert told.figures["speed_at_the_end_pu"] == pytest.approx(0.0, abs=0.2)
+    assert of_run(result).remark.startswith(f"motors that stall: motor2_1 at {told.time:.4g} s")
+
+
+@pytest.mark.parametrize(("duration", "VI"), [(0.1, 0.0), (1.5, 0.8)])
+def test_a_motor_that_recovers_or_is_off_does_not_stall(duration, VI, run):
+    assert stalls(run(fault(duration, X=0.0), stop=4.0, records=[with_torque(0, VI)])) == []
+
+
+@pytest.mark.parametrize(("mva", "told"), [(75, False), (10000, True)])
+def test_mvar_beside_a_motor_that_is_far_too_large_are_told(mva, told, tmp_path):
+    record = MOTOR.format(VI=0).replace(" 0 1.25 ", f" {mva} 0 ")
+    assert f" {mva} 0 " in record
+    (ready,) = load_case(mill_case(tmp_path, records=[record])).prepare(["base"])
+    found = [text for text in compute_modes(ready).warnings if "Mvar (B_shunt)" in text]
+    assert len(found) == told
+    for text in found:
+        assert text.startswith("motor2_1: beside it a susceptance feeds ")
+        assert "more than the 60 MW of the machine" in text
+        assert "S_n = 1e+04 MVA" in text

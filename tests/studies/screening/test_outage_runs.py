@@ -59,7 +59,7 @@ def test_trips_leave_the_verdict_open_and_all_outputs_name_them(screened):
     assert found.stable is None
     assert STUDY.code(found, True) == 1
     assert "what relays leave at 1 of them is not judged" in found.verdict
-    assert "in 1 of 2 relays or models trip, first case, line_1_2" in found.verdict
+    assert "in 1 of 2 relays or models trip, or motors stall, first case, line_1_2" in found.verdict
     told = json.loads(json.dumps(found.as_json()))["runs"]
     assert [(run["outage"], len(run["trips"])) for run in told] == [("line_1_2", 1), ("sg2", 0)]
     (in_json,) = told[0]["trips"]
@@ -106,6 +106,15 @@ def test_a_code_lets_converters_trip_in_runs_of_outages(tmp_path):
     assert (trip.of, trip.record) == ("gfor2", "PRC-029")
     with pytest.raises(InputError, match="protection = 'prc30'; it must be one of prc029"):
         case.screen(**wanted, protection="prc30")
+
+
+def test_a_motor_that_stalls_after_an_outage_is_found(screened):
+    motor = "2 'CIM5BL' 1 1 0.013 0.067 3.8 0.02 0.17 0 0 0 0 0 0 0 1.25 0.7 0 6 3 0 0"
+    found = screened([motor], ["sg2"], cleared_after="1.5 s")
+    (told,) = run_of(found, "sg2").trips
+    assert (told.of, told.record) == ("motor2_1", "")
+    assert told.message.startswith("motor2_1 stalls: its speed falls below 0.5 pu at t = ")
+    assert found.stable is None
 
 
 def test_a_run_that_cannot_be_is_an_item_that_is_not_judged(screened, monkeypatch):

@@ -35,6 +35,7 @@ _KINDS = {
     "loss_of_synchronism": "loss of synchronism",
     "not_judged": "not judged",
     "trip": "a relay trips",
+    "stall": "a motor stalls",
     "not_finite": "not a number",
 }
 
