@@ -28,6 +28,6 @@ def _of_machine(master: Master, name: str) -> Iterator[str]:
     yield (
         f"{name}: beside it a susceptance {feeds} {abs(beside):.4g} Mvar ({_BESIDE}), more than the "
         f"{abs(drawn_mw):.4g} MW of the machine, which alone draws {drawn_mvar + beside:.4g} Mvar where the power flow has "
-        f"{drawn_mvar:.4g}: it follows the voltage as a shunt does; correct the rating, S_n = {rating:.4g} MVA (MBASE "
-        "or PMULT of its record), or the load's reactive power"
+        f"{drawn_mvar:.4g}: it follows the voltage as a shunt does; correct the rating, S_n = {rating:.4g} MVA "
+        "(MBASE or PMULT of its record), or the load's reactive power"
     )
