@@ -76,9 +76,18 @@ def _susceptance(m: ModelBuilder, port: DevicePort, rating: Expr, v: Phasor) -> 
     )
     m.require(most_error - error_0 + MOST_POWER, text)
     m.require(most_error + error_0 + MOST_POWER, text)
-    text = "the override acts at the power flow's point already: raise DV, or Ksvs"
-    m.require(above - error_0 + MOST_POWER, text)
-    m.require(error_0 - below + MOST_POWER, text)
+    acts = "the override acts at the power flow's point already"
+    too_high, too_low = above - error_0 + MOST_POWER, error_0 - below + MOST_POWER
+    # with DV = 0 both limits go with 1/Ksvs, as the error does: Ksvs decides nothing
+    given = f"{acts}: raise DV, or Ksvs"
+    m.require(if_else(chosen, 1, too_high), given)
+    m.require(if_else(chosen, 1, too_low), given)
+    m.require(
+        if_else(chosen, too_high, 1), f"{acts}, with DV = 0 at Bpmax: lower Q_0, or raise Bpmax"
+    )
+    m.require(
+        if_else(chosen, too_low, 1), f"{acts}, with DV = 0 at Bpmin: raise Q_0, or lower Bpmin"
+    )
 
     reference = m.calculated("Vref", size_0 + error_0, "pu", "Voltage reference", base="bus")
     seen = low_pass_or_nothing(m, "measured", v.magnitude(), T_filter, size_0)

@@ -189,6 +189,7 @@ def test_csvgn3_is_csvgn1_while_its_override_rests(frequency):
         ("csvgn5", {"Q_0": 1.9}, "lower Q_0, or raise Bmax"),
         ("csvgn5", {"Vemax": 0.001}, "raise Vemax, or Ksvs"),
         ("csvgn5", {"DV": 0.001}, "raise DV, or Ksvs"),
+        ("csvgn5", {"DV": 0.0, "Bpmax": 0.0}, "with DV = 0 at Bpmax: lower Q_0, or raise Bpmax"),
         ("csvgn5", {"P_0": 0.1}, "feeds no active power"),
         ("cstatt", {"Q_0": 1.4}, "ICMAX: lower Q_0"),
         ("cstatt", {"Q_0": -1.4}, "ILMAX: raise Q_0"),

@@ -27,7 +27,7 @@ def _of_machine(master: Master, name: str) -> Iterator[str]:
     feeds = "feeds" if beside > 0 else "draws"
     yield (
         f"{name}: beside it a susceptance {feeds} {abs(beside):.4g} Mvar ({_BESIDE}), more than the "
-        f"{abs(drawn_mw):.4g} MW of the machine, which alone draws {drawn_mvar + beside:.4g} Mvar where the power flow has "
-        f"{drawn_mvar:.4g}: it follows the voltage as a shunt does; correct the rating, S_n = {rating:.4g} MVA "
-        "(MBASE or PMULT of its record), or the load's reactive power"
+        f"{abs(drawn_mw):.4g} MW of the machine, which alone draws {drawn_mvar + beside:.4g} Mvar where the power "
+        f"flow has {drawn_mvar:.4g}: it follows the voltage as a shunt does; correct the rating, "
+        f"S_n = {rating:.4g} MVA (MBASE or PMULT of its record), or the load's reactive power"
     )

@@ -19,6 +19,15 @@ _LEAST_SIGNALS = ("uel.V_UIMIN", "uel.V_ULMIN")
 _INVERSE_TIME = (("oel.EFD1", "oel.TIME1"), ("oel.EFD2", "oel.TIME2"), ("oel.EFD3", "oel.TIME3"))
 """Points of MAXEX1's and MAXEX2's inverse time: field [of the rated one], and the time there [s]."""
 
+_LIMITS_OF_COMPENSATORS = (
+    ("Vrefmin", "Vrefmax", "the slow control cannot move the reference as it is meant"),
+    ("Bmax", "Bshrt", "Bmax is taken for both, and the device has no short-time rating"),
+    ("Vdbd2", "Vdbd1", "the regulator rests again before it acts"),
+    ("Bpmin", "Bpmax", "the override turns around"),
+    ("Vemin", "Vemax", "the error has one value alone"),
+)
+"""Limits of static var compensators, the one that is the lower first, and what becomes of them turned around."""
+
 _SAME = 1e-3  # part by which two figures for one reactance may differ: files round them
 
 
@@ -29,6 +38,7 @@ def doubts_of_machine(
     yield from _chosen_limits(records)
     yield from _offsets(records, values)
     yield from _inverse_times(records, values)
+    yield from _turned_limits(records, values)
     x_d2, x_source = values.get("machine.X_d2"), machine.source.imag
     if x_d2 is None or abs(x_source - x_d2) <= _SAME * abs(x_d2):
         return
@@ -99,6 +109,20 @@ def _inverse_times(
             "beyond the point from which its time runs; look at EFDDES"
         )
         yield DoubtOfRecord("oel.EFDDES", record.place, text, "a limiter's aim beyond its limit")
+
+
+def _turned_limits(
+    records: Sequence[DynamicRecord], values: Mapping[str, float]
+) -> Iterator[DoubtOfRecord]:
+    """Ask about a compensator's limits of which the lower one is above the upper one."""
+    for low, high, taken in _LIMITS_OF_COMPENSATORS:
+        if low not in values or high not in values or values[low] <= values[high]:
+            continue
+        record = next((one for one in records if {low, high} <= _sets(one.name)), None)
+        if record is None:
+            continue
+        text = f"{record.name} has {low} = {values[low]:g} above {high} = {values[high]:g}: {taken}; look at both"
+        yield DoubtOfRecord(low, record.place, text, f"{low} of {record.name} above {high}")
 
 
 def _sets(name: str) -> set[str]:

@@ -222,6 +222,24 @@ def test_its_strategy_at_low_voltage_is_asked_about(gfor, tmp_path):
     assert "SVSMO1T2 has UV1 = 0.6" in questions_of(json.loads(out))
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("0.80 1.20 /", "1.20 0.80 /", "SVSMO1T2 has Vrefmin = 1.2 above Vrefmax = 0.8"),
+        ("0.012 1.10 0.95", "0.012 0.90 0.95", "SVSMO1T2 has Bmax = 0.95 above Bshrt = 0.9"),
+    ],
+)
+def test_limits_that_are_turned_around_are_asked_about(gfor, tmp_path, old, new, said):
+    files = with_shunt(tmp_path)
+    text = files[1].read_text()
+    for values, expected in (((old, old), False), ((old, new), True)):
+        assert old in text
+        files[1].write_text(text.replace(*values))
+        code, out, err = gfor("new", *files, "--out", tmp_path / "case.toml", "--json", "--force")
+        assert code == 0, err
+        assert (said in questions_of(json.loads(out))) == expected
+
+
 def test_a_model_of_a_shunt_that_is_not_there_is_asked_about(gfor, tmp_path):
     code, out, err = gfor(
         "new", *with_shunt(tmp_path, at=7), "--out", tmp_path / "case.toml", "--json"
