@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from time import monotonic
 from typing import Any, TypeVar
 
 from rich.console import Console, RenderableType
@@ -17,6 +16,7 @@ from orchestrator.face.api.progress import shown_progress
 from orchestrator.face.cli import arguments
 from orchestrator.face.cli.case_arguments import add_case_arguments, asked_of_case, case_of
 from orchestrator.face.cli.interrupted import saying_how_it_goes_on
+from orchestrator.face.cli.progress_lines import both, progress_lines
 from orchestrator.face.cli.terminal import (
     make_console,
     make_errors,
@@ -29,26 +29,12 @@ from orchestrator.face.cli.verdict import add_verdict_argument
 from orchestrator.output.report.progress import progress_bar
 from orchestrator.output.results.lock import hold_folder
 from orchestrator.studies.points.executor import Executor
+from orchestrator.studies.points.parts_done import counting
 from orchestrator.studies.points.points import CountReport
 from orchestrator.studies.points.store import POINTS, any_kept
 from orchestrator.studies.points.study import PointStudy, StudyAtOnce
 
 Result = TypeVar("Result")
-
-# where there is no terminal to draw a bar on, a line says how far it is after so long [s]
-EVERY = 10.0
-
-
-class _Lines:
-    """Says how far ``told`` (a study, and what it counts) is, at its begin and then every `EVERY` seconds."""
-
-    def __init__(self, told: tuple[str, str] | None) -> None:
-        self._told, self._next = told, 0.0
-
-    def say(self, done: int, total: int) -> None:
-        if self._told and done < total and monotonic() >= self._next:
-            make_errors().print(f"{self._told[0]}: {done} of {total} {self._told[1]}", markup=False)
-            self._next = monotonic() + EVERY
 
 
 class Progressing:
@@ -62,17 +48,19 @@ class Progressing:
         study: Callable[[CountReport], Result],
         executor: Executor,
         console: Console,
-        told: tuple[str, str] | None = None,
+        told: tuple[str, str] = ("computing", "points"),
     ) -> Result:
-        """Run the study, and close its executor; ``told`` is for lines on standard error where there is no terminal."""
-        lines = _Lines(None if console.is_terminal or console.is_jupyter else told)
-        with progress_bar(console) as bar:
+        """Run the study, and close its executor.
+
+        ``told``: the study, and what it counts, for lines on standard error where there is no terminal."""
+        lines = progress_lines(console, *told)
+        with counting(), lines, progress_bar(console) as bar:
             task = bar.add_task("Points", total=None)
 
             def report(done: int, total: int) -> None:
                 self._done, self._total = done, total
                 bar.update(task, completed=done, total=total)
-                lines.say(done, total)
+                lines.report(done, total)
 
             try:
                 return study(report)
@@ -119,8 +107,12 @@ def run_study(name: str, study: AnyStudy | Simple, options: argparse.Namespace) 
 def _run_at_once(name: str, study: Simple, options: argparse.Namespace) -> int:
     request = study.request(**asked_of_case(options, study.asks, name))
     folder = made_folder(options.out, "--out") if getattr(options, "out", None) else None
-    with shown_progress(study.counted.capitalize(), shown=not options.json) as report:
-        found = study.compute(case_of(options), request, report)
+    console = make_console(stderr=options.json)
+    with (
+        progress_lines(console, name, study.counted) as lines,
+        shown_progress(study.counted.capitalize(), shown=not options.json) as report,
+    ):
+        found = study.compute(case_of(options), request, both(report, lines.report))
     print_questions(study.prepared(found), as_json=options.json)
     written = found.save(folder) if folder else []
     end = f"Written: {', '.join(map(str, written))}" if written else ""
@@ -151,6 +143,7 @@ def working_in(
                 lambda report: study.compute(planned, executor, folder, report, *more),
                 executor,
                 make_console(stderr=options.json),
+                (name, study.counted),
             )
             # parts are of one study; a design has its tables elsewhere
             if others and not any(more) and not getattr(found.result, "stored", True):

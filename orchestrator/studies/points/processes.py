@@ -14,6 +14,7 @@ from concurrent.futures.process import BrokenProcessPool
 from functools import cache
 from multiprocessing import forkserver
 from multiprocessing.context import BaseContext
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -22,6 +23,7 @@ from orchestrator.core.options import Option
 from orchestrator.devices.fmi.interrupts import calls
 from orchestrator.studies.points.executor import ATTEMPTS, Result, Task, WorkerLostError
 from orchestrator.studies.points.main_guard import require_main_guard
+from orchestrator.studies.points.parts_done import join, tally
 
 _QUEUE_PER_WORKER = 2
 """Number of tasks that each worker is given at once. The second task is ready when the first one ends, which keeps the
@@ -100,7 +102,9 @@ class Processes:
         return sorted(suspects)
 
     def _new_pool(self, workers: int) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(workers, mp_context=self._context, initializer=_start_worker)
+        return ProcessPoolExecutor(
+            workers, mp_context=self._context, initializer=_start_worker, initargs=(tally(),)
+        )
 
     def close(self) -> None:
         pool, self._pool = self._pool, None
@@ -209,8 +213,11 @@ def _leave(number: int, frame: FrameType | None) -> None:
         calls.leave(frame)
 
 
-def _start_worker() -> None:
-    """Ignore Ctrl-C, which the parent handles, leave a task on SIGTERM, and end when the parent ends for any reason."""
+def _start_worker(file: Path | None) -> None:
+    """Ignore Ctrl-C, which the parent handles, leave a task on SIGTERM, and end when the parent ends for any reason.
+
+    ``file``: into which parts that are done are told; None where nobody counts."""
+    join(file)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _leave)
     parent = multiprocessing.parent_process()

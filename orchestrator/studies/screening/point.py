@@ -29,6 +29,7 @@ from orchestrator.studies.operating_points.preparation import (
 )
 from orchestrator.studies.points.codec import plain
 from orchestrator.studies.points.failure import Failure
+from orchestrator.studies.points.parts_done import tell_part
 from orchestrator.studies.points.task import Task, computed
 from orchestrator.studies.screening.modes import (
     CriticalRegion,
@@ -126,7 +127,7 @@ class _Worker:
 
     def stretch(self) -> StretchRecord:
         """The stretch; where an end of it has growth that its items do not show, all of them are counted."""
-        found = self._pass(everywhere=self._task.whole)
+        found = self._pass(everywhere=self._task.whole, told=True)
         ends = [
             r.found for r in found if r.found is not None and r.found.growing_elsewhere is not None
         ]
@@ -136,11 +137,15 @@ class _Worker:
             found = self._pass(everywhere=True)
         return self._record(found)
 
-    def _pass(self, *, everywhere: bool) -> list[_Result]:
-        """The anchor and then all items, each from what is most alike of those before it."""
+    def _pass(self, *, everywhere: bool, told: bool = False) -> list[_Result]:
+        """The anchor and then all items, each from what is most alike of those before it.
+
+        ``told``: whether each item is told as a part that is done."""
         items = [self._task.anchor, *self._task.items]
         results: list[_Result] = []
         for k, item in enumerate(items):
+            if k > 1 and told:
+                tell_part()
             if k == 1 and item == items[0]:
                 record, found = results[0].record, results[0].found
                 itself = tuple(range(len(record.eigenvalues)))

@@ -1,0 +1,88 @@
+"""How far a long command is, as lines on standard error where there is no terminal to draw a bar on."""
+
+from collections.abc import Callable
+from threading import Event, Thread
+from time import monotonic
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+
+from orchestrator.face.cli.terminal import make_errors
+from orchestrator.studies.points.parts_done import parts_done
+
+EVERY = 30.0  # from one line to the next [s]: a log of a night has some hundred
+_MINUTE = 60.0  # [s]
+_IN_SECONDS = 2 * _MINUTE  # times below this are told in seconds [s]
+
+
+class ProgressLines:
+    """Says every `EVERY` seconds how far a command is; a short one says nothing.
+
+    ``name``: of what is computed; ``counted``: what is counted, in words."""
+
+    def __init__(self, name: str, counted: str, *, shown: bool) -> None:
+        self._name, self._counted, self._shown = name, counted, shown
+        self._done = self._total = 0
+        self._stored: int | None = None  # what was there already when the first count came
+        self._began, self._ended = monotonic(), Event()
+        self._thread = Thread(target=self._say_now_and_then, daemon=True)
+
+    def report(self, done: int, total: int) -> None:
+        """Take a count, to be told at the next line."""
+        if self._stored is None:
+            self._stored = done
+        self._done, self._total = done, total
+
+    def __enter__(self) -> Self:
+        if self._shown:
+            self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._ended.set()
+        if self._shown:
+            self._thread.join()
+
+    def line(self) -> str:
+        """Return what is said now."""
+        passed = monotonic() - self._began
+        if not self._total:
+            return f"{self._name}: preparing, {_in_words(passed)}"
+        stored = self._stored or 0
+        # of a task that is under way, some parts may be done; all are not before its record is there
+        under_way = min(stored + parts_done(), self._total - 1)
+        done = max(self._done, under_way)
+        text = f"{self._name}: {done} of {self._total} {self._counted}, {_in_words(passed)}"
+        if done <= stored:
+            return text
+        left = passed * (self._total - done) / (done - stored)
+        return f"{text}, about {_in_words(left)} left"
+
+    def _say_now_and_then(self) -> None:
+        while not self._ended.wait(EVERY):
+            make_errors().print(self.line(), markup=False)
+
+
+def progress_lines(console: Console, name: str, counted: str) -> ProgressLines:
+    """Lines where a console draws no bar."""
+    return ProgressLines(name, counted, shown=not (console.is_terminal or console.is_jupyter))
+
+
+def _in_words(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < _IN_SECONDS else f"{seconds / _MINUTE:.0f} min"
+
+
+def both(one: Callable[[int, int], None], other: Callable[[int, int], None]) -> Callable[..., None]:
+    """Report a count to two."""
+
+    def report(done: int, total: int) -> None:
+        one(done, total)
+        other(done, total)
+
+    return report

@@ -1,0 +1,96 @@
+"""Progress of long commands where no terminal is: lines on standard error, and nowhere else."""
+
+import json
+import re
+
+import pytest
+
+from orchestrator.face.cli import main, progress_lines
+from orchestrator.face.cli.progress_lines import ProgressLines
+from orchestrator.studies.points.parts_done import counting, join, parts_done, tally, tell_part
+
+POINTS = "time,grid.X_L\n" + "".join(f"{k},{0.1 + 0.01 * k}\n" for k in range(6))
+
+
+@pytest.fixture
+def often(monkeypatch):
+    monkeypatch.setattr(progress_lines, "EVERY", 0.05)
+
+
+def lines_of(error, name):
+    return [line for line in error.splitlines() if line.startswith(f"{name}: ")]
+
+
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_a_screening_tells_how_far_it_is_within_its_only_task(often, tmp_path, capsys, workers):
+    points = tmp_path / "day.csv"
+    points.write_text(POINTS)
+    asked = ["two_area", "--scenario", "gfor", "--points", str(points), "--workers", workers]
+    assert main(["screen", *asked, "--out", str(tmp_path / "out"), "--json"]) == 0
+    out, error = capsys.readouterr()
+    assert json.loads(out)["items"]
+    said = lines_of(error, "screen")
+    counts = [int(found[1]) for line in said if (found := re.search(r": (\d) of 6 items", line))]
+    assert counts == sorted(counts)
+    assert {*range(1, 6)} & {*counts}
+    assert any(re.search(r"about \d+ s left$", line) for line in said)
+    assert "of 6 items" not in out
+
+
+def test_a_command_that_ends_before_the_first_line_says_nothing(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(progress_lines, "EVERY", 3600.0)
+    asked = ["two_area", "--scenario", "gfor", "--vary", "grid.X_L=0.1:0.11:2", "--workers", "1"]
+    assert main(["sweep", *asked, "--out", str(tmp_path)]) == 0
+    assert lines_of(capsys.readouterr().err, "sweep") == []
+
+
+@pytest.mark.parametrize(
+    ("name", "asked"),
+    [
+        ("sweep", ["two_area", "--vary", "grid.X_L=0.1:0.2:5", "--scenario", "gfor"]),
+        ("site", ["two_area_rms", "--scenario", "gfor", "--confirm", "1"]),
+    ],
+)
+def test_other_studies_say_it_on_standard_error_alone(often, tmp_path, capsys, name, asked):
+    assert main([name, *asked, "--out", str(tmp_path / "out")]) == 0
+    out, error = capsys.readouterr()
+    assert lines_of(error, name)
+    assert lines_of(out, name) == []
+
+
+def test_what_was_there_already_does_not_make_the_time_left_short(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(progress_lines, "monotonic", lambda: now[0])
+    lines = ProgressLines("sweep", "points", shown=False)
+    assert lines.line() == "sweep: preparing, 0 s"
+    lines.report(6, 10)
+    now[0] += 60.0
+    assert lines.line() == "sweep: 6 of 10 points, 60 s"
+    lines.report(8, 10)
+    assert lines.line() == "sweep: 8 of 10 points, 60 s, about 60 s left"
+    now[0] += 600.0
+    assert lines.line() == "sweep: 8 of 10 points, 11 min, about 11 min left"
+
+
+def test_parts_that_are_told_twice_are_never_all():
+    """As where a worker died and its task was computed again."""
+    lines = ProgressLines("screen", "items", shown=False)
+    with counting():
+        lines.report(0, 3)
+        for _ in range(7):
+            tell_part()
+        assert parts_done() == 7
+        assert lines.line().startswith("screen: 2 of 3 items")
+        lines.report(3, 3)
+        assert lines.line().startswith("screen: 3 of 3 items")
+
+
+def test_parts_are_told_to_nobody_once_nobody_counts():
+    with counting():
+        file = tally()
+    tell_part()
+    assert parts_done() == 0
+    join(file)  # a worker whose parent is gone
+    tell_part()
+    assert parts_done() == 0
+    join(None)
