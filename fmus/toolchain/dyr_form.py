@@ -50,7 +50,7 @@ class DyrRecord:
     ``compensator`` for what an exciter measures, which is no part of its own; ``converter`` for a record that is a
     whole component, to which ``electrical`` and ``plant`` may belong as its control and its plant's, ``shaft``,
     ``aerodynamics``, ``pitch`` and ``torque`` as its wind turbine's; ``plants`` for a controller of several units, a
-    component of its own; ``load`` for one that is a load's;
+    component of its own; ``load`` for one that is a load's; ``dc line`` for one of a DC line;
     ``part``: its value, the name of our part; for a whole component, its model;
     ``fields``: in the file's order; ``lacks``: parameters of our part that 0 leaves out, as the record has none;
     ``omissions``: what our part leaves out where a field, by its name, is not 0;
@@ -87,6 +87,7 @@ _SCOPES = {
     "uel": "uel.",
     "converter": "",
     "load": "",
+    "dc line": "",
     "electrical": "electrical.",
     "plant": "plant.",
     "plants": "",

@@ -46,6 +46,7 @@ FMUS = (
     "external_grid",
     "static_generation",
     "csvgn1_phasor",
+    "lcc_rectifier_phasor",
     "induction_motor_phasor",
     "dera1_phasor",
     "regca1_phasor",

@@ -41,6 +41,12 @@ _BUS = ({"v_re": 1.0, "v_im": 0.0}, {"v_re": float(_DIP.real), "v_im": float(_DI
 _FOLDER = "fmus/synchronous_generator"
 _GENERATOR = ("i_re", "i_im", "omega", "delta", "v_t", "E_fd", "P_m")
 _EXACT = {"machine.exact_conversion": 1.0}  # one generator shows the other conversion
+_FROM_INVERTER = {
+    "inverter.V_most": 545.8,
+    "inverter.drop": 25.43,
+    "inverter.v": 1.0,
+    "inverter.beyond": 0.0,
+}
 _INFEED = {"i_re": 13.5, "i_im": 0.0}
 REFERENCES = (
     Reference(
@@ -147,6 +153,20 @@ REFERENCES = (
         {"Q_0": 0.15},
         *_BUS,
         ("i_re", "i_im", "e_re", "e_im", "B"),
+    ),
+    Reference(
+        "lcc_rectifier_phasor",
+        "fmus/dc_line/reference_rectifier.csv",
+        {},
+        *(bus | _FROM_INVERTER for bus in _BUS),
+        ("i_re", "i_im", "e_re", "e_im", "inverter_I", "V_inverter", "alpha"),
+    ),
+    Reference(
+        "lcc_inverter_phasor",
+        "fmus/dc_line/reference_inverter.csv",
+        {},
+        *(bus | {"I_dc": 2.0, "V_dc": 490.0} for bus in _BUS),
+        ("i_re", "i_im", "e_re", "e_im", "V_most", "v", "gamma"),
     ),
     Reference(
         "cstatt_phasor",

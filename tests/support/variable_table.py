@@ -35,6 +35,8 @@ LEAFLETS = {
     "csvgn3_phasor": ROOT / "fmus" / "static_var" / "README.md",
     "csvgn5_phasor": ROOT / "fmus" / "static_var" / "README.md",
     "cstatt_phasor": ROOT / "fmus" / "static_var" / "README.md",
+    "lcc_rectifier_phasor": ROOT / "fmus" / "dc_line" / "README.md",
+    "lcc_inverter_phasor": ROOT / "fmus" / "dc_line" / "README.md",
     "dera1_phasor": ROOT / "fmus" / "distributed_generation" / "README.md",
     "pvd1_phasor": ROOT / "fmus" / "distributed_generation" / "README.md",
     "induction_generator_phasor": ROOT / "fmus" / "induction_machine" / "README.md",

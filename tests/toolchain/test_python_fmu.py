@@ -69,6 +69,8 @@ ALL_PATHS_OPEN = {
     "csvgn3_phasor": {"communication_step": 5e-3, "R": 0.01},
     "csvgn5_phasor": {"communication_step": 5e-3, "DV": 0.5, "R": 0.01},
     "cstatt_phasor": {"communication_step": 5e-3, "R": 0.01},
+    "lcc_rectifier_phasor": {"communication_step": 5e-3, "R": 0.01, "DELTI": 1.0},
+    "lcc_inverter_phasor": {"communication_step": 5e-3, "R": 0.01, "V_dc_0": 495.0},
     "svsmo1_phasor": {"communication_step": 5e-3, "R": 0.01, "Tb2": 0.5, "Kps": 0.01},
     "induction_motor_phasor": {"communication_step": 5e-3, "R2": 0.05, "X2": 0.1, "A": 0.5},
     "induction_generator_phasor": {
@@ -140,6 +142,20 @@ FED = {
 }
 # Outputs that reach some listed states only where a block is left out (time constant 0), or by the flags of a plant.
 BEHIND_LEFT_OUT_BLOCKS = {"P_m", "B", "I_p_command", "I_q_command"}
+_IN_SERVICE = {"interruption.of_current": 1.0, "interruption.of_voltage": 1.0}
+_LOW = {f"bus_voltage.{name}_re": 0.87 for name in ("once", "twice")} | _IN_SERVICE
+_LOW |= {f"bus_voltage.{name}_im": 0.0 for name in ("once", "twice")}
+# Values with which limits act that a model does not reach from its operating point by small changes: the inverter's
+# angle, the rectifier's angle, and both.
+AT_LIMITS = {
+    "lcc_rectifier_phasor": (
+        {"inverter.V_most": 500.0} | _IN_SERVICE,
+        {"inverter.V_most": 500.0} | _IN_SERVICE | {"interruption.of_current": 0.95},
+        {"inverter.V_most": 600.0} | _LOW,
+        {"inverter.V_most": 600.0} | _LOW | {"interruption.of_voltage": 0.95},
+        {"inverter.V_most": 494.0} | _LOW,
+    )
+}
 # States that act at a threshold alone, which small changes do not reach.
 BEHIND_THRESHOLDS = {name: {"pll.freezing.awake"} for name in ("gfl_l2ep", "gfl_l2ep_phasor")} | {
     "regfm_b1_phasor": {"delta_ITmax", "delta_ITmin", "Idf", "Qf"},  # at limits, and by VdrpFlag
@@ -157,6 +173,9 @@ BEHIND_THRESHOLDS = {name: {"pll.freezing.awake"} for name in ("gfl_l2ep", "gfl_
         "slow.integrator",
     },
     "induction_motor_phasor": {"relay.latch", "relay.opening"},
+    "lcc_rectifier_phasor": {
+        f"interruption.{name}" for name in ("blocking", "bypassing", "switching")
+    },
     "pvd1_phasor": {"trip_high_frequency.lost"},  # a share below 1 % is forgotten
 }
 # Blocks of the generators and the POD that the literature lets one leave out with a time constant of zero.
@@ -298,8 +317,9 @@ def test_outputs_and_derivatives_depend_on_what_they_list_and_on_nothing_else(na
     with initialised(fmu_path(name), ALL_PATHS_OPEN.get(name)) as component:
         x, y = RealBatch(component, knowns), RealBatch(component, list(listed))
         origin = x.read().copy()
-        for _ in range(5):
+        for values in ({}, {}, {}, {}, {}, *AT_LIMITS.get(name, ())):
             point = origin + 0.05 * random.standard_normal(len(knowns))
+            point[[knowns.index(known) for known in values]] = [*values.values()]
             x.values[:] = point
             x.write()
             base = y.read().copy()

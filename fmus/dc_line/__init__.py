@@ -1,0 +1,1 @@
+"""Two-terminal DC lines with line-commutated converters: a rectifier's and an inverter's station."""
