@@ -12,6 +12,7 @@ from orchestrator.cases.form.parameter_files import ParameterFile
 from orchestrator.cases.form.schema import CaseTable, ComponentTable, EventTable, ScenarioTable
 from orchestrator.cases.networks.data import NetworkData
 from orchestrator.cases.networks.measured_point import MeasuredPoint
+from orchestrator.cases.networks.psse.dc_line_models import ModelledLine
 from orchestrator.cases.networks.psse.load_relay_records import LoadRelay
 from orchestrator.cases.networks.psse.plant_controllers import PlantController, UnitOfPlant
 from orchestrator.cases.networks.psse.relay_records import UnitRelay
@@ -119,6 +120,8 @@ class Draft:
     # controllers of several units, and these units, by component
     plant_controllers: Sequence[PlantController] = ()
     units_of_plants: Mapping[str, UnitOfPlant] = field(default_factory=dict)
+    # DC lines with models of their own
+    dc_lines: Sequence[ModelledLine] = ()
     # relays of the labels of units, and of loads, by the records of dynamics data
     unit_relays: Sequence[tuple[str, UnitRelay]] = ()
     load_relays: Sequence[LoadRelay] = ()

@@ -1,6 +1,6 @@
 """The network of a case: written out in tables and files, taken from another program's data, or both."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -35,10 +35,12 @@ from orchestrator.cases.networks.conversion import (
 from orchestrator.cases.networks.element_names import BranchName
 from orchestrator.cases.networks.imported_flow import imported_equations
 from orchestrator.cases.networks.load_models import FlowLaws, device_laws, flow_laws, with_laws
-from orchestrator.cases.networks.psse.device_flow import solved_devices
+from orchestrator.cases.networks.psse.dc_line_models import SolvedLine, solved_lines
+from orchestrator.cases.networks.psse.device_flow import SolvedDevices, solved_devices
 from orchestrator.cases.networks.psse.device_notes import device_notes
 from orchestrator.cases.networks.psse.raw import read_raw
 from orchestrator.cases.networks.psse.raw_network import FileLoad, Machine, RawNetwork, bus_of_unit
+from orchestrator.cases.networks.psse.raw_uses import BY_MODEL
 from orchestrator.cases.networks.psse.sequence_elements import CaseElements, SequenceReading
 from orchestrator.cases.networks.psse.sequence_records import read_sequence_file
 from orchestrator.cases.networks.psse.solution import half_digit, stated_voltages
@@ -49,7 +51,7 @@ from orchestrator.cases.networks.psse.studied_parts import (
     part_notes,
     reference_note,
 )
-from orchestrator.cases.networks.record_use import RecordUse
+from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
 from orchestrator.cases.networks.regions import Regions
 from orchestrator.cases.networks.sequence_data import SequenceData
 from orchestrator.cases.networks.sources import read_matpower, read_pandapower
@@ -77,6 +79,7 @@ class _Source:
     controls: tuple[Control, ...] = ()  # taps and shunts that move after an outage
     counted_controls: str = ""  # how many could move, in words
     raw: RawNetwork | None = None  # what another file of the same program may name
+    dc_lines: tuple[SolvedLine, ...] = ()  # DC lines with a model of their own
 
 
 @dataclass(frozen=True)
@@ -121,18 +124,26 @@ class NetworkData:
     controls: tuple[Control, ...] = ()  # taps and shunts that move in the power flow of an outage
     counted_controls: str = ""  # how many could move, in words
     sequences: SequenceData | None = None  # of the negative and the zero sequence, from a file
+    dc_lines: tuple[SolvedLine, ...] = ()  # DC lines with a model of their own
 
 
 def network_data(
-    table: NetworkTable, directory: Path, slack: str | None = None, modelled: Modelled = ()
+    table: NetworkTable,
+    directory: Path,
+    slack: str | None = None,
+    modelled: Modelled = (),
+    *,
+    modelled_lines: Collection[str] = (),
 ) -> NetworkData:
     """Buses, lines, loads and shunts of a network table, its files and its source included.
 
     ``slack``: the unit or bus that the case names as the reference. ``modelled``: see `read_raw`.
+    ``modelled_lines``: names of DC lines with a record of dynamics data.
 
     Raises an `InputError` if a file is missing, lacks a column, holds something that is not a number, or a source holds
     something that the grid model does not have."""
-    found = _source(table, directory, slack, modelled)
+    asking = (slack, modelled, frozenset(modelled_lines))
+    found = _source(table, directory, asking)
     source = found.network
     lines = [
         Line(n, t.from_bus, t.to_bus, t.X, t.R, B=t.B, tap=t.tap, shift=t.shift, X_C=t.X_C)
@@ -196,6 +207,7 @@ def network_data(
         controls=found.controls,
         counted_controls=found.counted_controls,
         sequences=sequences.data if sequences else _without_file(found),
+        dc_lines=found.dc_lines,
     )
 
 
@@ -252,10 +264,14 @@ def bus_name(label: str) -> str:
     return f"bus_{label}" if label[:1].isdigit() else label
 
 
-def _source(table: NetworkTable, directory: Path, slack: str | None, modelled: Modelled) -> _Source:
+_Asking = tuple[str | None, Modelled, frozenset[str]]
+"""The unit or bus that the case names as the reference, and what has records of dynamics data: units, and DC lines."""
+
+
+def _source(table: NetworkTable, directory: Path, asking: _Asking) -> _Source:
     imported = ImportedNetwork()
     if table.raw is not None:
-        return _from_raw(directory / table.raw, table, slack, modelled)
+        return _from_raw(directory / table.raw, table, asking)
     if table.keep_load_parts:
         raise InputError(
             "keep_load_parts is for networks of PSS/E; remove the key, or give the file as 'raw'"
@@ -296,16 +312,27 @@ class _Asked:
     slack: str | None
     text: str  # the case's table as JSON, by which it is told from others
     modelled: Modelled
+    modelled_lines: frozenset[str]
     table: NetworkTable = field(compare=False)
 
 
-def _from_raw(path: Path, table: NetworkTable, slack: str | None, modelled: Modelled) -> _Source:
+def _from_raw(path: Path, table: NetworkTable, asking: _Asking) -> _Source:
     """A network of PSS/E, which every scenario of a case asks for."""
     path = seen_from_here(path)
     state = path.stat() if path.is_file() else None
     version = (state.st_mtime_ns, state.st_size) if state else (0, 0)
     text = table.model_dump_json()
-    return _read_from_raw(_Asked(path, version, slack, text, frozenset(modelled), table))
+    slack, modelled, lines = asking
+    asked = _Asked(
+        path,
+        version,
+        slack,
+        text,
+        modelled=frozenset(modelled),
+        modelled_lines=lines,
+        table=table,
+    )
+    return _read_from_raw(asked)
 
 
 @lru_cache(maxsize=2)
@@ -363,13 +390,16 @@ def _read_from_raw(asked: _Asked) -> _Source:
         )
         changes.append(Problem(raw.tables.name, text))
     solved = solved_devices(raw.devices, imported, stated_voltages(raw.tables.bus))
-    changes += device_notes(solved, table, raw.tables.name)
+    lines = solved_lines(solved, asked.modelled_lines)
+    modelled = [line.device for line in lines]
+    changes += device_notes(solved, table, raw.tables.name, modelled)
     with_devices = replace(imported, loads=(*imported.loads, *solved.loads))
     misfit = misfit_of(with_devices, raw.tables.bus, raw.tables.labels, NOT_SOLVED)
     generation = {
         bus: replace(g, rating_mva=ratings[bus]) for bus, g in imported.generation.items()
     }
-    records = tuple(replace(x, why=solved.words_of(x.kind, x.line) or x.why) for x in raw.records)
+    by_model = {(own.section, own.line) for own in modelled}
+    records = tuple(_with_words(x, solved, by_model) for x in raw.records)
     return _Source(
         replace(imported, generation=generation),
         tuple(changes),
@@ -378,12 +408,22 @@ def _read_from_raw(asked: _Asked) -> _Source:
         misfit,
         file_voltages(raw.tables.bus, raw.tables.labels),
         records=records,
-        device_loads=solved.loads,
+        device_loads=tuple(solved.loads_without(modelled)),
+        dc_lines=tuple(lines),
         file_loads=raw.loads,
         controls=moving.controls if table.move_controls else (),
         counted_controls=moving.counts_in_words,
         raw=raw,
     )
+
+
+def _with_words(
+    record: RecordUse, solved: SolvedDevices, by_model: Collection[tuple[str, int]]
+) -> RecordUse:
+    """Return a record's use with what its devices feed; ``by_model``: section and line of those with a model."""
+    if (record.kind, record.line) in by_model:
+        return replace(record, use=UseOfRecord.USED, why=BY_MODEL)
+    return replace(record, why=solved.words_of(record.kind, record.line) or record.why)
 
 
 def _choose_part(raw: RawNetwork, network: ImportedNetwork, slack: str | None) -> StudiedPart:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from fmus.dc_line.dyr_records import DC_LINE_RECORDS
 from fmus.grid.network import Network, Port
 from fmus.toolchain.catalogue import model_names, needs_arguments, network_of
 from orchestrator.cases.draft import Draft
@@ -19,9 +20,10 @@ from orchestrator.cases.form.schema import (
 )
 from orchestrator.cases.networks.data import network_data
 from orchestrator.cases.networks.element_names import ElementNames, names_without_units
-from orchestrator.cases.networks.psse.dyr_file import read_dyr
-from orchestrator.cases.networks.psse.static_vars import RECORDS, Modelled
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, read_dyr
+from orchestrator.cases.networks.psse.static_vars import RECORDS
 from orchestrator.cases.networks.sequence_data import windings_of
+from orchestrator.cases.scenario.dc_lines import names_of_lines
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import read_bytes
 
@@ -48,7 +50,14 @@ def read_network(draft: Draft) -> None:
     try:
         flow = draft.given.case.power_flow
         slack = flow.slack if flow else None
-        draft.data = network_data(table, draft.given.directory, slack, _static_vars(draft))
+        records = _device_records(draft)
+        draft.data = network_data(
+            table,
+            draft.given.directory,
+            slack,
+            frozenset((x.bus, x.machine) for x in records if x.name in RECORDS),
+            modelled_lines=names_of_lines(draft, records),
+        )
         _name_in_events(draft, names_without_units(draft.data))
         draft.found.questions += draft.data.changes
         draft.found.records += draft.data.records
@@ -57,17 +66,17 @@ def read_network(draft: Draft) -> None:
         draft.note_unread(where, error)
 
 
-def _static_vars(draft: Draft) -> Modelled:
-    """Return bus and identifier of the records of static var compensators; a file that has none is not read here."""
+def _device_records(draft: Draft) -> Sequence[DynamicRecord]:
+    """Return the records of compensators and DC lines, but those left out; a file without any is not read here."""
     units, network = draft.given.case.units, draft.given.case.network
     if units is None or units.dyr is None or network is None or network.raw is None:
         return ()
     path = seen_from_here(draft.given.directory / units.dyr)
-    if not path.is_file() or not any(name.encode() in read_bytes(path) for name in RECORDS):
+    known = {*RECORDS, *DC_LINE_RECORDS}
+    if not path.is_file() or not any(name.encode() in read_bytes(path) for name in known):
         return ()
     left = {name.upper() for name in units.dyr_leave_out}
-    wanted = {*RECORDS} - left
-    return frozenset((x.bus, x.machine) for x in read_dyr(path) if x.name in wanted)
+    return [x for x in read_dyr(path) if x.name in known - left]
 
 
 def _name_in_events(draft: Draft, names: ElementNames) -> None:

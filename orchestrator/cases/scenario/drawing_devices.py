@@ -6,13 +6,20 @@ from orchestrator.systems.coupling.system import ComponentPlan
 
 LOAD = "load"  # kind of the devices that are no sources
 
+_OF_TERMINALS = "V_dc_0"  # parameter that terminals of DC lines have alone
+
+
+def is_dc_terminal(plan: ComponentPlan) -> bool:
+    """Return whether a component is a terminal of a DC line."""
+    return _OF_TERMINALS in plan.description.variables
+
 
 def drawn_mw(plans: Mapping[str, ComponentPlan]) -> dict[str, float]:
-    """Return the active power [MW] of the devices that draw some at the operating point."""
+    """Return the active power [MW] of the devices that draw some at the operating point, but for those of DC lines."""
     found = {
         name: -plan.number("P_0") * plan.number("S_n")
         for name, plan in plans.items()
-        if plan.kind == LOAD and "P_0" in plan.description.variables
+        if plan.kind == LOAD and "P_0" in plan.description.variables and not is_dc_terminal(plan)
     }
     return {name: p_mw for name, p_mw in found.items() if p_mw > 0}
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from fmus.grid.element_data import Load
 from orchestrator.cases.networks.load_models import in_words
-from orchestrator.cases.scenario.drawing_devices import LOAD, drawn_mw, with_motors
+from orchestrator.cases.scenario.drawing_devices import LOAD, drawn_mw, is_dc_terminal, with_motors
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import number_of
 
@@ -24,6 +24,7 @@ class Facts:
     converters: int
     others: int  # devices of another kind, such as static var compensators
     motors: int  # devices that draw power as loads
+    dc_terminals: int  # of DC lines with models of their own
     governed: bool  # whether a machine has a governor
     load_mw: float  # active power of all loads, without what feeds in [MW]
     load_model: str
@@ -38,6 +39,7 @@ class Facts:
                 (self.machines, "machine"),
                 (self.converters, "converter"),
                 (self.motors, "motor"),
+                (self.dc_terminals, "DC terminal"),
                 (self.others, "other device"),
             )
             if n
@@ -73,6 +75,7 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
     machines = [n for n in feeding if plans[n].kind == "machine"]
     drawing = drawn_mw(plans)
     others = sum(plans[n].kind == LOAD for n in feeding)
+    terminals = [n for n in feeding if is_dc_terminal(plans[n])]
     magnitudes = [abs(flow.voltages[bus]) for bus in network.buses]
     loads = [
         (x, grid.number(f"{x.name}.scale") * grid.number(f"{x.name}.P")) for x in network.loads
@@ -85,8 +88,9 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
         buses=len(network.buses),
         machines=len(machines),
         converters=len(feeding) - len(machines) - others,
-        others=sum(plans[n].kind == LOAD and n not in drawing for n in feeding),
+        others=others - len(terminals) - sum(n in drawing for n in feeding),
         motors=sum(n in drawing for n in feeding),
+        dc_terminals=len(terminals),
         governed=any(
             v.startswith("governor.T_") for n in machines for v in plans[n].description.variables
         ),

@@ -12,6 +12,7 @@ from orchestrator.cases.form.remedies import KEEPING_LIMITS, with_slack
 from orchestrator.cases.form.schema import UnitReconnectionTable
 from orchestrator.cases.networks.controls import Control
 from orchestrator.cases.questions.plausibility import question
+from orchestrator.cases.scenario.dc_lines import check_dc_lines
 from orchestrator.cases.scenario.feeding_loads import feeding_loads
 from orchestrator.cases.scenario.flow_units import note_contradictions, undecided_units
 from orchestrator.cases.scenario.measured_points import start_measured_points
@@ -91,6 +92,7 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
         return None
     start_measured_points(draft, flow)
     start_plants(draft, flow)
+    check_dc_lines(draft)
     question(draft, undecided)
     draft.found.questions += [*_limit_questions(draft, flow), *_voltage_questions(draft, flow)]
     # else what it fed before is shared

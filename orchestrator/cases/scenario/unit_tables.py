@@ -42,6 +42,7 @@ from orchestrator.cases.networks.source_changes import Changes, Remark, kind_of
 from orchestrator.cases.networks.source_ratings import with_needed_ratings
 from orchestrator.cases.networks.unit_row import UnitRow, checked
 from orchestrator.cases.questions.plausibility import question
+from orchestrator.cases.scenario.dc_lines import dc_components, take_dc_lines
 from orchestrator.cases.scenario.motor_components import motor_components, take_motors
 from orchestrator.cases.scenario.plants_of_several import plant_components, take_plants
 from orchestrator.cases.scenario.protection_relays import take_relays
@@ -119,7 +120,8 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
                 if row.measured is not None:
                     draft.measured[name] = row.measured
                 draft.active_limits[name] = share * row.p_min_mw, share * row.p_max_mw
-    return components | motor_components(draft, motors) | plant_components(draft)
+    others = motor_components(draft, motors) | plant_components(draft) | dc_components(draft)
+    return components | others
 
 
 def _rows(draft: Draft, table: UnitsTable) -> tuple[list[UnitRow], Sequence[MotorLoad]]:
@@ -394,6 +396,7 @@ def _account(
     wanted = [record for record in records if record.name not in left]
     taken = take_laws(draft, wanted) | take_frequency(draft, wanted)
     taken |= motors.places | take_plants(draft, table, wanted, ours)
+    taken |= take_dc_lines(draft, table, wanted)
     relays = take_relays(draft, wanted)
     taken |= relays.places
     uses = [

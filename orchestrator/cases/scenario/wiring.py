@@ -5,6 +5,7 @@ from difflib import get_close_matches
 
 from fmus.toolchain.catalogue import model_names
 from orchestrator.cases.draft import Draft
+from orchestrator.cases.scenario.dc_lines import dc_sources
 from orchestrator.cases.scenario.measured_points import measured_sources
 from orchestrator.cases.scenario.plants_of_several import plant_sources
 from orchestrator.core.errors import InputError, Problem, QuestionTopic, few
@@ -41,7 +42,7 @@ def connect(draft: Draft) -> None:
     for name in at_buses:
         _connect_to_bus(draft, name, draft.tables[name].bus or "", taken.get(name, []))
     if not draft.found.network_failed and draft.grid in draft.system.components:
-        for source, target, place in plant_sources(draft):
+        for source, target, place in (*plant_sources(draft), *dc_sources(draft)):
             _try_connect(draft, source, target, place)
 
 

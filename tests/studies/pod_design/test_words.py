@@ -1,10 +1,9 @@
-"""What the first sentence on a design says beside the target, and how it spells options."""
+"""What the first sentence on a design says beside the target."""
 
 from types import SimpleNamespace
 
 import pytest
 
-from orchestrator.core.spelling import as_options, spelled
 from orchestrator.studies.pod_design.sheet import verdict
 
 REST = "; least damped of all then 8.71 % at 1.527 Hz"
@@ -38,23 +37,3 @@ def test_a_mode_below_what_is_asked_is_told_with_met(other, met, broken, said):
         active_bound=None,
     )
     assert verdict(design) == f"the target has 10.44 % of damping, 10.00 % are required{said}"
-
-
-def test_a_requirement_that_is_missed_names_the_keyword_to_python_and_the_option_to_a_terminal():
-    design = SimpleNamespace(
-        achieved_damping=0.05,
-        required_damping=0.1,
-        after=SimpleNamespace(other_named=None),
-        broken=None,
-        met=False,
-        worst_other=None,
-        damping_met=False,
-        refinement=None,
-        gain_is_swept=False,
-        other_gain=None,
-    )
-    said = verdict(design)
-    assert spelled(said).endswith("; use refine")
-    with as_options():
-        assert spelled(said) == said
-    assert said.endswith("; use --refine")

@@ -4,8 +4,8 @@ DC lines feed by the voltages at their buses, and others hold a voltage with wha
 limits. Our network has a load in the place of each end, with the powers of this solution."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,11 +32,20 @@ _MOST_RELEASES = 3  # of one limit
 
 @dataclass(frozen=True)
 class SolvedDevices:
-    """Loads in the place of devices, what these feed in words, and what is unusual in them, each with its device."""
+    """Loads in the place of devices, what these feed in words, and what is unusual in them, each with its device.
+
+    ``standing``: the loads by their devices; ``voltages``: of the solution [pu], by the buses' numbers."""
 
     loads: tuple[Load, ...] = ()
     words: tuple[tuple[HeldDevice, str], ...] = ()
     doubts: tuple[tuple[HeldDevice, str], ...] = ()
+    standing: tuple[tuple[HeldDevice, tuple[Load, ...]], ...] = ()
+    voltages: Mapping[int, complex] = field(default_factory=dict)
+
+    def loads_without(self, modelled: Collection[HeldDevice]) -> Iterator[Load]:
+        """Yield the loads of all devices but those with a model of their own."""
+        for device, loads in self.standing:
+            yield from () if device in modelled else loads
 
     def words_of(self, section: str, line: int) -> str:
         """Return what the devices of a section feed whose records stand in a line; in RAWX there may be several."""
@@ -64,17 +73,22 @@ def solved_devices(
             f"file's voltages, and what holds a voltage feeds no reactive power; {_remedy(devices, network, stated)}"
         )
         doubts.append((devices[0], text))
-    loads, words, seen, standing = [], [], Counter[str](), set(network.buses)
+    loads: list[Load] = []
+    words, of_devices, seen, standing = [], [], Counter[str](), set(network.buses)
     for device in devices:
         own = [ending for ending in state.endings if ending.device is device]
+        count = len(loads)
         for ending in (x for x in own if f"bus_{x.bus}" in standing):
             seen[ending.name] += 1
             name = ending.name if seen[ending.name] == 1 else f"{ending.name}_{seen[ending.name]}"
             loads.append(Load(name, f"bus_{ending.bus}", -ending.fed.real, -ending.fed.imag))
+        of_devices.append((device, tuple(loads[count:])))
         words.append((device, _in_words(device, own)))
         doubts += [(device, text) for text in device.doubts(state.voltages)]
         doubts += [(device, ending.doubt) for ending in own if ending.doubt]
-    return SolvedDevices(tuple(loads), tuple(words), tuple(doubts))
+    return SolvedDevices(
+        tuple(loads), tuple(words), tuple(doubts), tuple(of_devices), state.voltages
+    )
 
 
 def _remedy(

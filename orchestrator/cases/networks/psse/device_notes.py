@@ -1,7 +1,10 @@
 """Words on the devices of a PSS/E file that our network has as loads."""
 
+from collections.abc import Collection
+
 from orchestrator.cases.form.schema import NetworkTable
 from orchestrator.cases.networks.psse.device_flow import SolvedDevices
+from orchestrator.cases.networks.psse.devices import HeldDevice
 from orchestrator.cases.networks.source_changes import Changes
 from orchestrator.core.errors import Problem, few, number_of
 
@@ -23,12 +26,20 @@ _OPEN = (
 )
 
 
-def device_notes(solved: SolvedDevices, table: NetworkTable, place: str) -> list[Problem]:
-    """Return a row for each kind of device with what they feed and draw, and one for each kind of doubt."""
+def device_notes(
+    solved: SolvedDevices, table: NetworkTable, place: str, modelled: Collection[HeldDevice] = ()
+) -> list[Problem]:
+    """Return a row for each kind of device with what they feed and draw, and one for each kind of doubt.
+
+    ``modelled``: devices with a model of their own, which are no loads."""
     changes = Changes(place)
     is_open = table.device_model.active is None or table.device_model.reactive is None
     for section, name in _NAMES.items():
-        own = {device: text for device, text in solved.words if device.section == section}
+        own = {
+            device: text
+            for device, text in solved.words
+            if device.section == section and device not in modelled
+        }
         if not own:
             continue
         shown = few(own.values(), _SHOWN, "; ")

@@ -74,7 +74,8 @@ def _use_of(
     """Return what became of a record, why, and whether it is of no machine."""
     key = record.bus, record.machine
     of_load = names_load(record.name)
-    of_none = of_load or record.name in NUMBERED or kind_of(record.name) == _PLANTS
+    of_plants = record.name in NUMBERED or kind_of(record.name) == _PLANTS
+    of_none = of_load or of_plants or bool(record.line_of_dc)
     if of_none and record.name in left:
         return UseOfRecord.NOT_USED, "dyr_leave_out names it", False
     if key in machines and not of_load:

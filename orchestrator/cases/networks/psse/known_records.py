@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from fmus.dc_line.dyr_records import DC_LINE_RECORDS, INVERTER
 from fmus.distributed_generation.dyr_records import DISTRIBUTED_RECORDS
 from fmus.grid_following.dyr_approximation import FIELDS, MODEL
 from fmus.induction_machine.dyr_records import INDUCTION_RECORDS
@@ -35,6 +36,8 @@ _DISTRIBUTED = {
     "DERA1": "WECC's specification of DER_A; fields as PowerSystems.jl lists PSS/E's",
     "PVD1": "WECC's PVD1 as PowerWorld's help and ANDES have it; fields as Argonne's DYN reads them",
 }
+_DC_LINES = "PowerWorld's help on PSS/E's models of DC lines; fields as STEPS reads them"
+_OF_LINE = f"{INVERTER} at the other end; no inductance of the line"
 _INDUCTION = "PowerWorld's guide to PSS/E's machine models"
 _FREQUENCY = "PowerWorld's guide to PSS/E's load models"
 _RELAYS = "PowerWorld's guide to PSS/E's relay models; fields as InterPSS and GridPACK read them"
@@ -116,6 +119,10 @@ def known_records() -> list[KnownRecord]:
     found += [
         KnownRecord(name, "converter", record.part, _DISTRIBUTED[name], "; ".join(_limits(record)))
         for name, record in DISTRIBUTED_RECORDS.items()
+    ]
+    found += [
+        KnownRecord(name, "device (DC line)", record.part, _DC_LINES, _OF_LINE)
+        for name, record in DC_LINE_RECORDS.items()
     ]
     found += [
         KnownRecord(name, "relay", "unit_trip", _RELAYS, _OF_BUS if name in OF_BUSES else "")

@@ -17,6 +17,9 @@ from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
 _OUT = 4  # IDE of a bus that is out of service
 _IREG = 7  # column of the bus whose voltage a machine controls
 _USED = (UseOfRecord.USED, "")
+BY_MODEL = "by the model of its record of dynamics data"
+"""Why a device's record is used."""
+
 _NO_EFFECT = (UseOfRecord.NOT_USED, "no effect on the network")
 _JOINING = ("branch", "system switching device")  # that may be zero impedance lines
 _OF_SECTION = {
@@ -52,7 +55,7 @@ def record_uses(
             if (section, k) in unused:
                 use, why = UseOfRecord.NOT_USED, unused[section, k]
             if lines[0].line in modelled:
-                use, why = UseOfRecord.USED, "by the model of its record of dynamics data"
+                use, why = UseOfRecord.USED, BY_MODEL
             if lines[0].line in dropped:
                 use, why = UseOfRecord.NOT_USED, dropped[lines[0].line]
             found.append(RecordUse(raw.place, lines[0].line, section, use, why))

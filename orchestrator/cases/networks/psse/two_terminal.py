@@ -10,7 +10,7 @@ from orchestrator.cases.networks.psse.devices import DeviceEnd, HeldDevice, Volt
 from orchestrator.cases.networks.source_changes import Remark
 from orchestrator.core.errors import InputError
 
-_CURRENT = 2  # MDC of a line that holds its current
+CURRENT = 2  # MDC of a line that holds its current
 _ROUNDS = 500
 _ACCURATE = 1e-12  # change of the current in a round [kA]
 _HALVINGS = 60  # of the range of currents in which both angles are at their least
@@ -92,7 +92,7 @@ class TwoTerminal(HeldDevice):
         Raises an `InputError` where the line cannot carry what it is set to."""
         rectifier, inverter = (abs(voltages[bus]) for bus in self.buses)
         order = abs(self.setting)
-        current = order / 1000 if self.mode == _CURRENT else order / max(self.scheduled_kv, 1e-3)
+        current = order / 1000 if self.mode == CURRENT else order / max(self.scheduled_kv, 1e-3)
         for _ in range(_ROUNDS):
             inverter_kv = self._inverter_kv(inverter, current)
             rectifier_kv = inverter_kv + self.r_ohm * current
@@ -135,7 +135,7 @@ class TwoTerminal(HeldDevice):
             return needed - self.bridges[0].most_voltage(rectifier, current)
 
         least = 0.0
-        most = abs(self.setting) / (1000 if self.mode == _CURRENT else self.scheduled_kv / 2)
+        most = abs(self.setting) / (1000 if self.mode == CURRENT else self.scheduled_kv / 2)
         if not excess(least) < 0 < excess(most):
             return None
         for _ in range(_HALVINGS):
@@ -151,7 +151,7 @@ class TwoTerminal(HeldDevice):
 
     def _order(self, rectifier_kv: float, inverter_kv: float) -> float:
         """Return the current that is ordered [kA]."""
-        if self.mode == _CURRENT:
+        if self.mode == CURRENT:
             return abs(self.setting) / 1000
         if inverter_kv < self.least_kv:
             return abs(self.setting) / self.scheduled_kv

@@ -3,6 +3,7 @@
 import tomllib
 from collections.abc import Iterator, Sequence
 
+from fmus.dc_line.dyr_records import DC_LINE_RECORDS
 from orchestrator.cases.form.schema import LoadModelTable
 from orchestrator.cases.networks.psse.composite_loads import COMPOSITE_NAMES
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
@@ -35,6 +36,8 @@ _LAWS = {0.0: "p", 1.0: "i", 2.0: "z"}
 _SUM = 1e-3  # by which shares may miss 1
 _MOST_BUSES = 8
 _PHASORS = '; induction motors stand for it, which are phasor models: write models = "phasor" at the top of the case'
+_PHASOR_LINE = '; its model is one of phasors: write models = "phasor" at the top of the case'
+_NO_LINE = "; the RAW file has no DC line of this name in service with a current, through bridges without capacitors"
 _NO_LOAD = "; the file has no load in service that it names and that draws active power"
 
 
@@ -70,6 +73,8 @@ def unused_models(
             remedy = f" ({reason})" if reason else remedy
             if name in MOTOR_NAMES or name in COMPOSITE_NAMES:
                 remedy = _NO_LOAD if among_phasors else _PHASORS
+            if name in DC_LINE_RECORDS:
+                remedy = _NO_LINE if among_phasors else _PHASOR_LINE
             places = few(
                 dict.fromkeys(record.line_of_dc or str(record.bus) for record in own), _MOST_BUSES
             )

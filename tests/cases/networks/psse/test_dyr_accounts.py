@@ -97,7 +97,7 @@ def test_models_of_dc_lines_are_passed_over_and_asked_about(tmp_path):
     ]
     first, second = (str(question) for question in unused_models(records, uses))
     assert "line 4: CDC4T (DC line NORTH-SOUTH) is of no machine and not used: what it" in first
-    assert "constant (no model of a DC line is here)" in " ".join(first.split())
+    assert "constant; its model is one of phasors: write models" in " ".join(first.split())
     assert "line 6: VSCHVDCP0 (DC line Link 2)" in second
 
 
