@@ -48,7 +48,7 @@ def test_texts_of_a_point_name_options_as_they_are_typed_whoever_computes_it(mon
     text = "write `gfor new --reactive-limits`, or " + Option.SET + " grid.X=1"
     question = Problem("own.raw", text)
     asked = SimpleNamespace(study=SimpleNamespace(reference="", fingerprint="", trust_fmus=False))
-    asked.study.varied = frozenset()
+    asked.study.varied = asked.study.line_ends = frozenset()
     assert points.computed(asked, lambda task, case: str(question)) == (
         "own.raw: write `gfor new --reactive-limits`, or --set grid.X=1"
     )
