@@ -179,7 +179,12 @@ _ENDED = (BrokenProcessPool, WorkerLeftError, SystemExit)
 
 
 class _Work:
-    busy = leaving = False
+    busy = leaving = own = False
+
+
+def in_own_worker() -> bool:
+    """Return whether this process is a worker of `Processes`: it ends with its study, so an FMU may stay open in it."""
+    return _Work.own
 
 
 def _end_workers(pool: ProcessPoolExecutor) -> None:
@@ -220,6 +225,7 @@ def _start_worker(file: Path | None) -> None:
     join(file)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _leave)
+    _Work.own = True
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent,), daemon=True).start()

@@ -1,16 +1,25 @@
 """One point of a sweep: its task and its result."""
 
 from dataclasses import dataclass, field, replace
+from functools import cache
+from multiprocessing.util import Finalize
 from typing import Any
 
 from orchestrator.cases.case import Case
 from orchestrator.cases.form.schema import Value
 from orchestrator.cases.questions.plausibility import overloads
+from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.cases.scenario.service import in_service
 from orchestrator.linear.spectra.mode_tracking import ModeSet
 from orchestrator.studies.black_box.coupled_modes import coupled_with_boxes
-from orchestrator.studies.modes.modes import ModesResult, compute_modes
+from orchestrator.studies.modes.modes import ModesResult, compute_modes, modes_of
+from orchestrator.studies.operating_points.bench import PointBench
 from orchestrator.studies.points.failure import Failure
+from orchestrator.studies.points.processes import in_own_worker
 from orchestrator.studies.points.task import Kept, Task, computed
+
+_EARLY = 10
+"""Priority at the end of a worker: before multiprocessing's own, and before folders are removed."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +59,27 @@ def _modes(task: SweepPointTask, case: Case) -> PointRecord:
         question for question in prepared.questions if question not in prepared.idle.values()
     )
     # A sweep follows modes from point to point itself, and asks of all scenarios together.
-    find = coupled_with_boxes if task.black_box else compute_modes
+    find = coupled_with_boxes if task.black_box else _on_open_fmus
     return _record(find(replace(prepared, beside=None, questions=asked), task.frequency_range))
+
+
+def _on_open_fmus(prepared: PreparedScenario, frequency_range: tuple[float, float]) -> ModesResult:
+    """`compute_modes` to the last bit, in a worker on the FMUs of its point before, where they can serve this one."""
+    if not in_own_worker():
+        return compute_modes(prepared, frequency_range)
+    bench = _bench_of_worker()
+    try:
+        return modes_of(prepared, bench.master(in_service(prepared)), frequency_range)
+    except BaseException:
+        bench.close()
+        raise
+
+
+@cache
+def _bench_of_worker() -> PointBench:
+    bench = PointBench(remember=True)
+    Finalize(None, bench.close, exitpriority=_EARLY)  # a worker runs none of `atexit`
+    return bench
 
 
 def _record(result: ModesResult) -> PointRecord:

@@ -1,10 +1,13 @@
 """One point of a sweep: what comes back from disk, and what a failure that is nobody's fault leaves behind."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.core.errors import ErrorKind
+from orchestrator.studies.operating_points import bench
 from orchestrator.studies.points.store import PointStore
 from orchestrator.studies.sweep import point
 from orchestrator.studies.sweep.axes import parse_vary
@@ -89,3 +92,36 @@ def test_a_range_whose_end_has_no_power_flow_is_no_range_that_is_refused():
     error = compute_point(plan.task(plan.scenarios[0], (0,))).error
     assert "no solution found" in error
     assert "is it in MVA" not in error
+
+
+def test_points_of_a_worker_share_fmus_and_are_those_of_fresh_ones_to_the_last_bit(
+    tmp_path, monkeypatch
+):
+    axes = [parse_vary("a1.gain=3:4:3"), parse_vary("slow.T=-1,1")]
+    plan = plan_sweep(load_case(two_oscillators(tmp_path)), SweepRequest(axes))
+    tasks = [plan.task(plan.scenarios[0], place) for place in product(range(3), range(2))]
+    alone = [compute_point(task) for task in tasks]
+    opened, fresh = [], bench.running
+
+    def counted(prepared):
+        opened.append(prepared)
+        return fresh(prepared)
+
+    monkeypatch.setattr(bench, "running", counted)
+    monkeypatch.setattr(point, "in_own_worker", lambda: True)
+    with bench.PointBench(remember=True) as of_worker:
+        monkeypatch.setattr(point, "_bench_of_worker", lambda: of_worker)
+        together = [compute_point(task) for task in tasks]
+    for one, other in zip(alone, together, strict=True):
+        assert (one.failure is None) == (other.failure is None)
+        assert one.error == other.error
+        assert (one.named, one.warnings, one.stability) == (
+            other.named,
+            other.warnings,
+            other.stability,
+        )
+        if one.modes is not None:
+            assert one.modes.eigenvalues.tobytes() == other.modes.eigenvalues.tobytes()
+            assert one.modes.right.tobytes() == other.modes.right.tobytes()
+    assert sum(record.modes is None for record in together) == 3
+    assert len(opened) == 4  # the first, and after each that fails
