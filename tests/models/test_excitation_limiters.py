@@ -309,3 +309,59 @@ def test_limiters_need_a_regulator():
             synchronous_generator_phasor(exciter="manual", **named)
     with pytest.raises(ValueError, match="did you mean 'maxex2'"):
         synchronous_generator_phasor(exciter="sexs", oel="maxex3")
+
+
+POLYGON = {"K_UL": 2.0, "K_UI": 0.0, "V_UIMIN": -9.0, "V_UIMAX": 9.0}
+POLYGON |= {
+    f"{name}{k}": 9.0 * sign for k in "12" for name, sign in (("V_UELMAX", 1), ("V_UELMIN", -1))
+}
+POLYGON |= {"V_ULMIN": -9.0, "V_ULMAX": 9.0}
+
+
+def signal_of_uel2c(P, Q, **values):
+    alone = limiter(POLYGON | values, uel=UELS["uel2c"])
+    assert not refused(alone)
+    i = np.conj((P + 1j * Q) / V_T)
+    found, _ = integrated(alone, lambda t: [E_FD, E_FD, i.real, i.imag], 3.0)
+    return found[-1]["v_s"]
+
+
+@pytest.mark.parametrize(
+    ("P", "edge"),
+    [(0.0, -0.31), (0.15, -0.31), (0.45, -0.295), (0.9, -0.21), (0.96, -0.105), (1.08, 0.105)],
+)
+def test_uel2c_lifts_what_lies_below_its_polygon(P, edge):
+    """K_UL·(Q_ref − Q)/K_fix, with points as far as P rises and straight on beyond the last one."""
+    bare = {"k_1": 0.0, "k_2": 0.0, "K_fix": 0.5}
+    assert signal_of_uel2c(P, -0.5, **bare) == pytest.approx(2 * (edge + 0.5) / 0.5, abs=1e-4)
+    assert signal_of_uel2c(-P, -0.5, **bare) == pytest.approx(2 * (edge + 0.5) / 0.5, abs=1e-4)
+
+
+def test_uel2c_scales_its_polygon_with_the_voltage_and_its_gain_with_the_angle():
+    u = V_T  # V_bias < 0: the voltage itself
+    P = 0.45
+    edge = np.interp(P / u**2, [0.3, 0.6], [-0.31, -0.28]) * u**2
+    scaled = signal_of_uel2c(P, -0.4, V_bias=-1.0)
+    assert scaled == pytest.approx(2 * (edge + 0.4), abs=1e-4)
+    along = V_T**2 / 1.8 - 0.4
+    gain = along / np.hypot(along, P)
+    adjusted = signal_of_uel2c(P, -0.4, V_bias=-1.0, SW=2.0, T_adj=0.1)
+    assert adjusted == pytest.approx(2 * (edge + 0.4) / gain, abs=1e-4)
+
+
+def test_uel2c_rests_above_its_polygon_and_integrates_below_it():
+    values = POLYGON | {
+        "K_UL": 0.0,
+        "K_UI": 1.0,
+        "V_UIMIN": 0.0,
+        "k_1": 0.0,
+        "k_2": 0.0,
+        "T_UQ": 0.0,
+    }
+    alone = limiter(values, uel=UELS["uel2c"])
+    assert max(map(abs, alone.rates([E_FD, E_FD, 0.7, -0.1]).values())) < 1e-12
+    below = np.conj((0.15 - 0.5j) / V_T)
+    found, x = integrated(alone, lambda t: [E_FD, E_FD, below.real, below.imag], 1.0)
+    assert found[-1]["v_s"] == pytest.approx(0.19, rel=0.05)
+    found, _ = integrated(alone, lambda t: [E_FD, E_FD, 0.7, 0.1], 3.0, x=x)
+    assert found[-1]["v_s"] == pytest.approx(0.0, abs=1e-3)
