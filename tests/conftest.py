@@ -20,6 +20,7 @@ from fmus.toolchain.native_fmu import NativeFmu
 from fmus.toolchain.python_fmu import PythonFmu
 from orchestrator.core.spelling import as_options
 from orchestrator.face.cli import main
+from tests.support.bytecode import TESTS, import_share, keep
 from tests.support.durations import MEASURED, Measure, longest_first, mark
 from tests.support.skips import Skips, in_ci
 
@@ -30,6 +31,7 @@ def pytest_configure(config):
     In CI a skip that is not on the list fails the session; with xdist the process that started the others counts.
     """
     gc.disable()
+    keep()
     os.fsync = lambda handle: None  # no test cuts the power, and thousands of files would wait
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         # a shell starts what runs in its background deaf to Ctrl-C, and all that this starts would
@@ -45,6 +47,14 @@ def pytest_configure(config):
 def pytest_xdist_auto_num_workers():
     """Two a core for ``-n auto``: a test waits for processes, signals and time-outs as long as it computes."""
     return 2 * len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else None
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection(session):
+    """The workers of a whole run share the work of compiling the tests."""
+    worker = getattr(session.config, "workerinput", None)
+    if worker and [Path(name).resolve() for name in session.config.args] == [TESTS]:
+        import_share(int(worker["workerid"].removeprefix("gw")), worker["workercount"])
 
 
 @pytest.hookimpl(wrapper=True)

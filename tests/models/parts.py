@@ -76,24 +76,22 @@ def stabilizer(name, values=None, *, sees_voltage=False, sees_all=False, scope="
 
 def integrated(model, inputs, end, step=1e-3, x=None):
     """Outputs at every step, by Runge-Kutta of order 4 with held inputs; ``inputs`` gives them at a time."""
-    x = np.array(model.x if x is None else x, dtype=float)
+    rates, outputs = model.rates_and_outputs
+    x = np.array(model.x if x is None else x, dtype=float).tolist()
     names = [v.name for v in model.model.outputs]
     found = []
     for k in range(round(end / step)):
-        u = inputs(k * step)
-
-        def rate(at, u=u):
-            return model.model.derivatives(at, u, model.p, model.c)[0]
-
-        k1 = rate(x)
-        k2 = rate(x + step / 2 * k1)
-        k3 = rate(x + step / 2 * k2)
-        k4 = rate(x + step * k3)
-        x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-        found.append(
-            dict(zip(names, *model.model.outputs_function(x, u, model.p, model.c), strict=True))
-        )
-    return found, x
+        u = np.array(inputs(k * step), dtype=float).ravel().tolist()
+        (k1,) = rates([x, u])
+        (k2,) = rates([[a + step / 2 * k for a, k in zip(x, k1, strict=True)], u])
+        (k3,) = rates([[a + step / 2 * k for a, k in zip(x, k2, strict=True)], u])
+        (k4,) = rates([[a + step * k for a, k in zip(x, k3, strict=True)], u])
+        x = [
+            a + step / 6 * (r1 + 2 * r2 + 2 * r3 + r4)
+            for a, r1, r2, r3, r4 in zip(x, k1, k2, k3, k4, strict=True)
+        ]
+        found.append(dict(zip(names, *outputs([x, u]), strict=True)))
+    return found, np.array(x)
 
 
 def refused(model):

@@ -1,10 +1,12 @@
 """A model's functions at one set of parameters, with names instead of positions."""
 
 from collections.abc import Mapping
+from functools import cached_property
 
 import numpy as np
 
 from fmus.toolchain.model import Model
+from fmus.toolchain.symbols import Function, symbols
 from tests.support.jacobians import jacobians
 from tests.support.written_out import written_out
 
@@ -28,6 +30,16 @@ class Evaluated:
     @property
     def states(self):
         return self._named(self.model.states, self.x)
+
+    @cached_property
+    def rates_and_outputs(self):
+        """Functions of lists [x, u] alone: what depends on parameters only is computed once."""
+        model = self.model
+        x, u = symbols("x", len(model.states)), symbols("u", len(model.inputs))
+        return [
+            Function(f.name, [x, u], f.of(x, u, self.p, self.c)).values
+            for f in (model.derivatives, model.outputs_function)
+        ]
 
     def vector(self, states):
         """Values by name as the vector of states."""

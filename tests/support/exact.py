@@ -1,5 +1,8 @@
 """The exact continuous linear model of a prepared case: CasADi Jacobians, interconnected without any FMU."""
 
+from collections.abc import Callable
+from functools import cache, lru_cache
+
 import numpy as np
 from scipy.linalg import expm
 
@@ -28,7 +31,7 @@ def exact_continuous(
     inputs = _inputs(prepared, parts)
     blocks = {}
     for name, (model, p, c, x) in parts.items():
-        blocks[name] = [np.array(block) for block in jacobians(model)(x, inputs[name], p, c)]
+        blocks[name] = [np.array(block) for block in _jacobians(model)(x, inputs[name], p, c)]
         rates = np.array(model.derivatives(x, inputs[name], p, c))
         assert np.abs(rates).max(initial=0) < 1e-6, f"{name} is not in steady state"  # [1/s]
     return _interconnect(prepared, parts, blocks)
@@ -40,15 +43,25 @@ def _parts(prepared: PreparedScenario, network: Network | None) -> dict:
     for name, plan in prepared.system.components.items():
         own = network is not None and plan.description.model_name == network.name
         model = (
-            build_model("grid", network=network)
+            written_out(build_model("grid", network=network))
             if own
-            else build_model(plan.description.model_name)
+            else _of_catalogue(plan.description.model_name)
         )
-        model = written_out(model)  # functions of (x, u, p, c) alone
         p = np.array([float(plan.parameters.get(v.name, v.start)) for v in model.parameters])
         c, x = model.initialise(p)
         parts[name] = (model, p, c, x)
     return parts
+
+
+@cache
+def _of_catalogue(name: str) -> Model:
+    """A model as functions of (x, u, p, c) alone; its equations are differentiated once, at whatever point they are."""
+    return written_out(build_model(name))
+
+
+@lru_cache(maxsize=16)  # models: those of the catalogue in a file of tests, and some networks
+def _jacobians(model: Model) -> Callable[..., list[np.ndarray]]:
+    return jacobians(model)
 
 
 def _inputs(prepared: PreparedScenario, parts: dict) -> dict[str, np.ndarray]:
@@ -118,7 +131,7 @@ def exact_step_map(prepared: PreparedScenario, network: Network | None = None) -
     inputs = _inputs(prepared, parts)
     step = {}
     for name, (model, p, c, x) in parts.items():
-        A, B, C, D = (np.array(block) for block in jacobians(model)(x, inputs[name], p, c))
+        A, B, C, D = (np.array(block) for block in _jacobians(model)(x, inputs[name], p, c))
         n, m = B.shape
         held = np.zeros((n + m, n + m))
         held[:n, :n], held[:n, n:] = A, B

@@ -113,10 +113,13 @@ class Function:
             raise ValueError(
                 f"{self.name}: arguments of {[*map(len, values)]} elements, not {[*map(len, self.inputs)]}"
             )
+        return tuple(np.array(vector, dtype=float) for vector in self.values(values))
+
+    def values(self, arguments: Values) -> Values:
+        """Values of all outputs at a point as lists, of arguments that are lists of the right lengths."""
         self._calls += 1
         often = self._calls > OFTEN and len(self.instructions) <= _LONGEST
-        found = self._compiled(values) if often else self._interpreted(values)
-        return tuple(np.array(vector, dtype=float) for vector in found)
+        return self._compiled(arguments) if often else self._interpreted(arguments)
 
     def _interpreted(self, values: Values) -> Values:
         found = [[0.0] * len(vector) for vector in self.outputs]

@@ -92,9 +92,7 @@ class BroughtModules:
         if top in sys.builtin_module_names:
             return True
         files = [
-            getattr(m, "__file__", None) or ""
-            for n, m in sys.modules.items()
-            if n.partition(".")[0] == top
+            getattr(sys.modules[name], "__file__", None) or "" for name in _names(sys.modules, top)
         ]
         if any(file.endswith(tuple(EXTENSION_SUFFIXES)) for file in files):
             return True
@@ -168,7 +166,14 @@ def _modules_in(place: str) -> set[str]:
 
 def _of(modules: dict[str, ModuleType], top: str) -> dict[str, ModuleType]:
     """Take a package with all that lies in it out of a table of modules."""
-    return {name: modules.pop(name) for name in list(modules) if name.partition(".")[0] == top}
+    return {name: modules.pop(name) for name in _names(modules, top)}
+
+
+def _names(modules: Mapping[str, ModuleType], top: str) -> list[str]:
+    """Names of a package and all that lies in it; parts of one that failed to import stay without it."""
+    inside = f"{top}."
+    found = [name for name in modules if name.startswith(inside)]  # among thousands, at each import
+    return [top, *found] if top in modules else found
 
 
 def _equal(one: Path, other: Path) -> bool:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from rich.markup import escape
 from rich.table import Table
 
+from orchestrator.core.options import Option
 from orchestrator.linear.spectra.modes import Mode, damping_ratio
 from orchestrator.linear.spectra.stability import Stability
 from orchestrator.output.report.mode_tables import eigenvalue_text
@@ -244,7 +245,10 @@ def verdict(d: PodDesign) -> str:
         if d.final is d.designed and d.active_bound == "lower":
             text += (
                 f"; the lower bound of the gain is active, {d.unbounded_gain:.4g} pu were computed before it: "
-                f"--gain-bounds 0:{d.request.bounds(search=True)[1]:g} --refine finds the least gain that meets it"
+                + Option.GAIN_BOUNDS
+                + f" 0:{d.request.bounds(search=True)[1]:g} "
+                + Option.REFINE
+                + " finds the least gain that meets it"
             )
         return text
     return text + (_out_of_reach(d, d.refinement) if d.refinement else _other_gain(d))
@@ -253,14 +257,16 @@ def verdict(d: PodDesign) -> str:
 def _other_gain(d: PodDesign) -> str:
     """Return what another gain does with the design's lead/lag."""
     if d.other_gain is None:
-        return "; use --refine"
+        return "; use " + Option.REFINE
     low, high = d.request.bounds(search=False)
     gain, there = f"K = {d.other_gain.setting.gain:.4g} pu", percent(d.other_gain.damping_ratio)
     if d.other_gain.damping_ratio >= d.required_damping:
-        return f"; {gain} with the same lead/lag has {there}, at the cost of another mode: use --refine"
+        cost = f"; {gain} with the same lead/lag has {there}, at the cost of another mode: use "
+        return cost + Option.REFINE
     return (
-        f"; with this lead/lag no gain from {low:g} to {high:g} pu has more than {there}, at {gain}: see with --refine "
-        "what another one does"
+        f"; with this lead/lag no gain from {low:g} to {high:g} pu has more than {there}, at {gain}: see with "
+        + Option.REFINE
+        + " what another one does"
     )
 
 
@@ -276,7 +282,8 @@ def _out_of_reach(d: PodDesign, r: Refinement) -> str:
     if r.even is not None:
         text += ". The setting chosen gives the best least damping of all modes that was found"
     if d.final.setting.gain == low > 0:
-        text += ". The setting chosen is at the lower bound of the gain: a lower one in --gain-bounds may allow more"
+        text += ". The setting chosen is at the lower bound of the gain: a lower one in "
+        text += Option.GAIN_BOUNDS + " may allow more"
     return text
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import astuple
 from itertools import zip_longest
 from pathlib import Path
@@ -13,6 +12,7 @@ from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import write_text
+from orchestrator.core.spelling import spelled
 from orchestrator.core.truth import NoTruth
 from orchestrator.linear.spectra.modes import Mode, damping_percent, damping_ratio
 from orchestrator.output.report.notebook import page
@@ -23,8 +23,6 @@ from orchestrator.studies.pod_design.design import PodDesign
 from orchestrator.studies.pod_design.lead_lag import LeadLag, angle_deg
 from orchestrator.studies.pod_design.margins import Margins
 from orchestrator.studies.pod_design.sheet import LABELS, mode_text, percent, verdict
-
-_OPTION = re.compile(r"--([a-z][a-z-]+)")  # Python's keyword is spelt like it
 
 
 class ControllerDesign(NoTruth, ask=".met"):
@@ -57,7 +55,7 @@ class ControllerDesign(NoTruth, ask=".met"):
     @property
     def verdict(self) -> str:
         """The verdict in one sentence, with the bound where the gain stands at one."""
-        return _OPTION.sub(lambda found: found[1].replace("-", "_"), verdict(self.result))
+        return spelled(verdict(self.result))
 
     def table(self) -> pd.DataFrame:
         """The mode before and after: eigenvalue [1/s, rad/s] and damping ratio, beside the required one."""

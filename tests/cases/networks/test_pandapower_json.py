@@ -2,6 +2,7 @@
 
 import json
 import warnings
+from functools import cache
 
 import pandapower as pp
 import pandas as pd
@@ -15,11 +16,20 @@ from orchestrator.cases.networks.sources import read_pandapower
 from orchestrator.core.errors import InputError
 
 
-def saved(folder, change=lambda net: None):
+@cache
+def written(change):
     net = networks.case9()
     change(net)
+    return pp.to_json(net)
+
+
+def unchanged(net):
+    """The network as pandapower has it."""
+
+
+def saved(folder, change=unchanged):
     path = folder / "net.json"
-    path.write_text(pp.to_json(net), encoding="utf-8")
+    path.write_text(written(change), encoding="utf-8")
     return path
 
 
@@ -90,8 +100,12 @@ def test_deep_brackets_are_one_error(tmp_path):
         read(path)
 
 
+def with_a_characteristic(net):
+    SplineCharacteristic(net, [0, 1, 2], [1.0, 2.0, 3.0])
+
+
 def test_every_figure_of_a_network_stays(tmp_path):
-    path = saved(tmp_path, lambda net: SplineCharacteristic(net, [0, 1, 2], [1.0, 2.0, 3.0]))
+    path = saved(tmp_path, with_a_characteristic)
     text = path.read_text(encoding="utf-8")
     assert '345.0,\\"b' in text
     path.write_text(text.replace('345.0,\\"b', '345.30000000000001,\\"b'), encoding="utf-8")

@@ -1,9 +1,11 @@
-"""What the first sentence on a design says beside the target."""
+"""What the first sentence on a design says beside the target, and how it spells options."""
 
 from types import SimpleNamespace
 
 import pytest
 
+from orchestrator.core.options import Option
+from orchestrator.core.spelling import parts_of
 from orchestrator.studies.pod_design.sheet import verdict
 
 REST = "; least damped of all then 8.71 % at 1.527 Hz"
@@ -37,3 +39,22 @@ def test_a_mode_below_what_is_asked_is_told_with_met(other, met, broken, said):
         active_bound=None,
     )
     assert verdict(design) == f"the target has 10.44 % of damping, 10.00 % are required{said}"
+
+
+def test_a_requirement_that_is_missed_names_the_keyword_to_python_and_the_option_to_a_terminal():
+    design = SimpleNamespace(
+        achieved_damping=0.05,
+        required_damping=0.1,
+        after=SimpleNamespace(other_named=None),
+        broken=None,
+        met=False,
+        worst_other=None,
+        damping_met=False,
+        refinement=None,
+        gain_is_swept=False,
+        other_gain=None,
+    )
+    said = verdict(design)
+    assert said.endswith("; use --refine")
+    assert parts_of(said)[-1] == Option.REFINE
+    assert Option.REFINE.python == "refine"
