@@ -80,10 +80,18 @@ class Explanation:
 
 @dataclass(frozen=True)
 class CauseSearch:
-    """Causes that were found, the one that leaves the least first; ``finished``: whether all were tried."""
+    """Causes that were found, the one that leaves the least first.
+
+    ``finished``: whether all were tried; ``held``: whether the model was held in step for it."""
 
     causes: Sequence[Explanation]
     finished: bool = True
+    held: bool = False
+
+    @property
+    def explains(self) -> bool:
+        """Return whether the first of them takes most of the error away."""
+        return bool(self.causes) and self.causes[0].explains
 
 
 def later(
@@ -119,16 +127,13 @@ def delay_of(
     return delay if abs(delay) >= _LEAST_DELAY else None
 
 
-def capped(
-    responses: Responses, measured: Responses, voltages: Sequence[Numbers], limit: float
-) -> list[Complex]:
-    """Responses that are cut where their current is above a limit [pu of the rating].
+def capped(responses: Responses, voltages: Sequence[Numbers], limit: float) -> list[Complex]:
+    """Responses that are cut where their current is above a limit [pu of the rating], at their own angle.
 
-    There the angle is the measured one: a device at its limit decides otherwise what it gives up."""
+    The measured angle would be a freedom for each sample, which no other cause has."""
     found = []
-    for own, seen, voltage in zip(responses, measured, voltages, strict=True):
-        at_limit = limit * np.maximum(voltage, _LEAST_VOLTAGE) * np.exp(1j * np.angle(seen))
-        found.append(np.where(_current(own, voltage) > limit, at_limit, own))
+    for own, voltage in zip(responses, voltages, strict=True):
+        found.append(own / np.maximum(_current(own, voltage) / limit, 1.0))
     return found
 
 

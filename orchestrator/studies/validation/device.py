@@ -18,6 +18,7 @@ from orchestrator.devices.fmi.devices import NO_BUS, PORT, is_controller_alone
 from orchestrator.devices.fmi.instance import is_ours
 from orchestrator.studies.black_box.bench import drive
 from orchestrator.studies.validation.averaging import averaged
+from orchestrator.studies.validation.held_in_step import hold_in_step
 from orchestrator.studies.validation.instances import InstanceRun, InstanceShelf
 from orchestrator.studies.validation.record import Recording
 from orchestrator.studies.validation.trials import TrialLog
@@ -25,6 +26,7 @@ from orchestrator.systems.coupling.step_awareness import STEP_PARAMETER
 
 _VOLTAGE, _CURRENT = ("v_re", "v_im"), ("i_re", "i_im")
 _NAMES = (_VOLTAGE, _CURRENT)
+_IN_PHASOR = np.array([1.0, 1j])  # of a row of two components
 _STARTS = ("P_0", "Q_0", "v_0", "theta_0")
 _STILL = 1e-4  # movement of the current in a round [pu of the rating] at which a device is at rest
 _ROUND = 0.5  # time [s] for which it is looked at
@@ -85,6 +87,7 @@ class PlayedDevice:
     step_size: float = 1e-4  # communication step [s]
     held: Mapping[str, float] = field(default_factory=dict)  # its other inputs
     isolated: bool | None = None  # as in `open_component`
+    gives_way: bool = False  # whether the voltage turns with it, so that it stays in step
     shelf: InstanceShelf = field(default_factory=InstanceShelf, compare=False)
     trials: TrialLog = field(default_factory=TrialLog, compare=False)  # that it refused
 
@@ -103,6 +106,11 @@ class PlayedDevice:
         if not self.takes_any_step or self.step_size >= _ROUGH_STEP:
             return self
         return replace(self, step_size=_ROUGH_STEP)
+
+    @property
+    def in_step(self) -> PlayedDevice:
+        """The same beside a voltage that turns with it."""
+        return replace(self, gives_way=True)
 
     def with_values(self, values: Mapping[str, float | bool]) -> PlayedDevice:
         return replace(self, values={**self.values, **values})
@@ -224,13 +232,45 @@ class PlayedDevice:
         times: Numbers = np.asarray(self.step_size * np.arange(steps + 1))
         voltage = recording.at(times)
         held = self._step_voltages(recording, steps)
-        late = _columns(held[:, -1]) if held.shape[1] > 1 else None
-        rows = _columns(held.mean(axis=1))
         index = len(before) - 1
-        found = drive(component, _NAMES, rows, self.step_size, index, late=late)
-        currents = np.concatenate([before[-1:], found]) @ np.array([1.0, 1j])
-        power = voltage * currents.conj() * (SYSTEM_BASE_MVA / self.rating)
+        scale = SYSTEM_BASE_MVA / self.rating
+        turn: Numbers = np.zeros(steps + 1)
+        if self.gives_way:
+            currents, turn[1:] = self._held_in_step(component, recording, held, index)
+        else:
+            late = held[:, -1] if held.shape[1] > 1 else None
+            currents = self._currents(component, held.mean(axis=1), late, index)
+        currents = np.concatenate([before[-1:] @ _IN_PHASOR, currents])
+        power = voltage * currents.conj() * scale + turn
         return averaged(times, power, recording.average, recording.times, recording.ahead)
+
+    def _held_in_step(
+        self, component: Component, recording: Recording, held: Complex, index: int
+    ) -> tuple[Complex, Numbers]:
+        """Currents while the voltage turns with them, and the turn as power [pu of the rating]."""
+        scale = SYSTEM_BASE_MVA / self.rating
+        made = index
+
+        def stretch(voltage: Complex, late: Complex) -> Complex:
+            nonlocal made
+            found = self._currents(component, voltage, late, made)
+            made += len(voltage)
+            return found * scale
+
+        good = recording.good
+        current = np.conj(recording.power[good] / recording.voltage[good])
+        ends: Numbers = np.asarray(self.step_size * np.arange(1, len(held) + 1))
+        measured: Complex = np.interp(ends, recording.times[good], current)
+        run = hold_in_step(stretch, (held.mean(axis=1), held[:, -1]), measured, self.step_size)
+        return run.current / scale, run.turn
+
+    def _currents(
+        self, component: Component, voltage: Complex, late: Complex | None, index: int
+    ) -> Complex:
+        """Currents after steps with so many voltages, in the device's unit."""
+        read = None if late is None else _columns(late)
+        found = drive(component, _NAMES, _columns(voltage), self.step_size, index, late=read)
+        return np.asarray(found @ _IN_PHASOR)
 
     def _step_voltages(self, recording: Recording, steps: int) -> Complex:
         """The voltages that short steps in each step would hold, shape (steps, short steps in one)."""

@@ -31,6 +31,10 @@ from orchestrator.studies.validation.parameters import NEVER, Adjustable, adjust
 from orchestrator.studies.validation.residuals import LEAST_SCATTER, Report
 
 _MOST_RECORDED = 12.0  # length of the recordings with which causes are tried, all together [s]
+_HELD_AFTER = (
+    4.0  # part of an event after its begin in which the device is held in step [s]: a swing or two
+)
+_HELD_BEFORE = 0.5  # part before it, the same [s]
 _MOST_EVENTS = 3  # those with the largest errors
 _STEP = 0.02  # difference for a sensitivity, as part of a parameter's reach
 _WORSE = 1.2  # times the squared error: a position that leaves more at a first look is none
@@ -46,12 +50,25 @@ Responses = Sequence[Complex]
 
 
 def explain_errors(
-    device: PlayedDevice, events: Sequence[RecordedEvent], report: Report = lambda text: None
+    device: PlayedDevice,
+    events: Sequence[RecordedEvent],
+    report: Report = lambda text: None,
+    in_step: Sequence[RecordedEvent] | None = None,
 ) -> CauseSearch:
     """Causes that would explain the errors, each by itself, the one that leaves the least first.
 
-    Of long recordings the first seconds of the events with the largest errors are looked at. Ctrl-C leaves the causes
-    that were found until then."""
+    ``in_step``: the events up to where the device falls out of step, where it does. If nothing explains most of the
+    error, causes are tried while the device is held in step. Of long recordings the first seconds of the events with
+    the largest errors are looked at. Ctrl-C leaves the causes that were found until then."""
+    found = _search(device, in_step or events, report)
+    if found.explains or not found.finished:
+        return found
+    short = [cut_event(one, _HELD_AFTER, _HELD_BEFORE) for one in events]
+    other = _search(device.in_step, short, report)
+    return replace(other if other.explains else found, finished=other.finished)
+
+
+def _search(device: PlayedDevice, events: Sequence[RecordedEvent], report: Report) -> CauseSearch:
     found: list[Explanation] = []
     finished = True
     try:
@@ -59,8 +76,8 @@ def explain_errors(
             found.append(one)
     except KeyboardInterrupt:
         finished = False
-    better = [one for one in found if one.left < one.error]
-    return CauseSearch(sorted(better, key=lambda one: one.left), finished)
+    better = sorted((one for one in found if one.left < one.error), key=lambda one: one.left)
+    return CauseSearch(better, finished, held=device.gives_way)
 
 
 def _causes(
@@ -323,7 +340,7 @@ def _limits(bench: _Bench) -> Iterator[Explanation]:
     limit = cap_of_current(bench.base, measured, voltages)
     if limit is None:
         return
-    left = bench.errors(capped(bench.base, measured, voltages, limit))
+    left = bench.errors(capped(bench.base, voltages, limit))
     yield bench.explanation(CauseKind.LIMIT, "limit of the current", None, limit, left, unit="pu")
     tried: list[tuple[float, VariableInfo, Values]] = []
     for info, values in itertools.islice(_limiters(bench, limit), _MOST_LIMITS):

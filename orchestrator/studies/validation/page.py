@@ -182,7 +182,9 @@ def _explained(result: ValidationResult) -> str:
 
 
 def _causes_said(result: ValidationResult) -> str:
-    return explanation_sentence(result.explanations, finished=not result.interrupted)
+    return explanation_sentence(
+        result.explanations, finished=not result.interrupted, in_step=result.explained_in_step
+    )
 
 
 def _not_judged(result: ValidationResult) -> str:

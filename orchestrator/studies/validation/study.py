@@ -100,6 +100,7 @@ class ValidationResult:
     fit: Fit | None = None
     confirmations: Sequence[FitCheck] = field(default=())
     explanations: Sequence[Explanation] = field(default=())
+    explained_in_step: bool = False  # whether the model was held in step for them
     others: Sequence[EventComparison] = field(default=())  # of the other model, in the same order
     interrupted: bool = False  # before all that was asked for was done
 
@@ -178,9 +179,15 @@ def _validate(request: ValidationRequest, report: Report) -> ValidationResult:
     others = _others(request, [one.event for one in comparisons], report)
     result = add_verdict(ValidationResult(request, comparisons, others=others))
     if request.explain:
-        events = [in_step(one).event for one in result.comparisons]
-        search = explain_errors(request.device, events, report)
-        result = replace(result, explanations=search.causes, interrupted=not search.finished)
+        events = [one.event for one in result.comparisons]
+        before = [in_step(one).event for one in result.comparisons]
+        search = explain_errors(request.device, events, report, before)
+        result = replace(
+            result,
+            explanations=search.causes,
+            explained_in_step=search.held,
+            interrupted=not search.finished,
+        )
     return _with_fit(result, report) if request.fit and not result.interrupted else result
 
 

@@ -114,7 +114,10 @@ class Validation:
     def _explained_json(self) -> dict[str, Any]:
         if not self.result.request.explain:
             return {}
-        return {"explanations": [one.as_json() for one in self.result.explanations]}
+        return {
+            "explanations": [one.as_json() for one in self.result.explanations],
+            "explained_in_step": self.result.explained_in_step,
+        }
 
     def _fit_json(self) -> dict[str, Any]:
         fit = self.result.fit
@@ -246,7 +249,11 @@ def parts(found: Validation) -> Iterator[RenderableType]:
     if result.criteria:
         yield _worst_criteria(result.criteria)
     if result.request.explain:
-        said = explanation_sentence(result.explanations, finished=not result.interrupted)
+        said = explanation_sentence(
+            result.explanations,
+            finished=not result.interrupted,
+            in_step=result.explained_in_step,
+        )
         yield escape(said)
     if result.explanations:
         yield explanation_table(result.explanations[:_SHOWN])

@@ -498,6 +498,12 @@ EXPLANATION_COLUMNS = ("Cause", "Now", "Instead", "rms error left [pu]", "Explai
 """Heads of `explanation_cells`."""
 
 
+_HELD = (
+    "For that the model was held in step: the voltage's angle gives way to the model's current, and what it gives way "
+    "counts as an error."
+)
+
+
 def value_text(value: float | bool | None) -> str:
     """Write a value with four digits; a dash where there is none."""
     if value is None:
@@ -519,11 +525,15 @@ def explanation_cells(one: Explanation) -> tuple[str, ...]:
     )
 
 
-def explanation_sentence(explanations: Sequence[Explanation], *, finished: bool = True) -> str:
+def explanation_sentence(
+    explanations: Sequence[Explanation], *, finished: bool = True, in_step: bool = False
+) -> str:
     """Name the cause that explains the most, and those that explain nearly as much.
 
-    ``finished``: whether all causes were tried."""
+    ``finished``: whether all causes were tried; ``in_step``: whether the model was held in step for them."""
     said = _said_of_causes(explanations)
+    if in_step:
+        said += f" {_HELD}"
     return said if finished else f"Interrupted before all causes were tried. {said}"
 
 

@@ -1,0 +1,69 @@
+"""A play-back that gives way: the recorded voltage turns with a model that would fall out of step beside it.
+
+A device at its limit of the current is unstable beside a voltage that does not give way, though the plant was stable
+in its grid. What no sample holds then makes the right model fall as well as a wrong one. So the angle of the voltage
+follows that of the model's current, as an observer's state follows what is measured (Luenberger, 1964). With the
+model's current i and the measured one i_m, both in the recording's frame [pu of the rating], the turn φ moves by
+
+    dφ/dt = g · Im(i · conj(i_m)).
+
+A model that is right feeds the measured current, and nothing turns. What gives way is counted as an error: as the
+power that it would move through a usual reactance. The page on play-back derives it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from orchestrator.core.arrays import Complex, Numbers
+
+_GAIN = 2.0
+"""Speed of the turn for a whole current that is a radian off [1/s]; from 1 to 4 the right model leaves the least."""
+
+_INTERVAL = 1e-3
+"""Time for which that speed is held [s]; with twice as much the ringing between device and voltage grows."""
+
+_LASTS = 1.0
+"""Time for which a turn counts [s]: an angle that stays is another zero, and moves nothing."""
+
+_REACTANCE = 1.0
+"""Between the turned voltage and the recorded one, through which a turn counts as power [pu of the rating]."""
+
+Drive = Callable[[Complex, Complex], Complex]
+"""Steps a device with the voltages of some steps, and with those at which it is read; gives its currents."""
+
+
+@dataclass(frozen=True)
+class StepRun:
+    """The currents of a run that was held in step, in the recording's frame, and the turn as power [pu]."""
+
+    current: Complex
+    turn: Numbers
+
+
+def hold_in_step(
+    drive: Drive, voltage: tuple[Complex, Complex], measured: Complex, step_size: float
+) -> StepRun:
+    """Drive a device while the voltage turns with its current.
+
+    ``voltage``: for each step that which is held in it, and that at which the current is read; ``measured``: the
+    current at the ends of the steps [pu of the rating], as ``drive`` gives it."""
+    held, late = voltage
+    each = max(1, round(_INTERVAL / step_size))
+    parts, turns = [], []
+    turn = slow = rate = 0.0
+    for first in range(0, len(held), each):
+        part = slice(first, first + each)
+        along = step_size * np.arange(1, len(held[part]) + 1)
+        angle = turn + rate * along  # a jump of it would ring
+        current = drive(held[part] * np.exp(1j * angle), late[part] * np.exp(1j * angle))
+        current = current * np.exp(-1j * angle)
+        parts.append(current)
+        turns.append((angle - slow) / _REACTANCE)
+        time, turn = float(along[-1]), float(angle[-1])
+        slow += (turn - slow) * time / _LASTS
+        ahead = current.mean() * np.conj(measured[part].mean())
+        rate = _GAIN * float(ahead.imag)
+    return StepRun(np.concatenate(parts), np.concatenate(turns))
