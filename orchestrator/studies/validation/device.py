@@ -258,7 +258,7 @@ class PlayedDevice:
             return found * scale
 
         good = recording.good
-        current = np.conj(recording.power[good] / recording.voltage[good])
+        current: Complex = np.conj(recording.power[good] / recording.voltage[good])
         ends: Numbers = np.asarray(self.step_size * np.arange(1, len(held) + 1))
         measured: Complex = np.interp(ends, recording.times[good], current)
         run = hold_in_step(stretch, (held.mean(axis=1), held[:, -1]), measured, self.step_size)
