@@ -466,6 +466,7 @@ _ELSEWHERE = (
     "of a RAW file, and the network is",  # as above
     "a system of its own, with a reference of its own",  # tests/cases/networks/psse/test_studied_parts.py
     "what the control does to a mode",  # tests/cases/networks/psse/test_dc_line_models.py
+    "of whose fields no public source has the order",  # tests/cases/networks/psse/test_dyr_converters.py
     "study each on its own",  # tests/cases/networks/cgmes/test_cgmes.py, by the same function
 )
 """Remedies that other tests type, or that no small network asks for."""

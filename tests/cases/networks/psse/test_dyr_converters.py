@@ -107,6 +107,15 @@ def test_what_cannot_be_taken_over(old, new, words, tables):
         tables(MACHINES.replace(old, new))
 
 
+def test_the_remedy_for_a_record_of_no_public_order_works_as_it_is_typed(tables):
+    typed = '[units]\nreplace = ["3"]\nconverter_parameters = { mp = 0.03 }'
+    case = PHASORS.replace("[units]", typed).replace('"gfor"', '"regfm_c1_phasor"')
+    found = tables(MACHINES.replace("'REGFMA1'", "'REGFM_C1'"), case)
+    assert found["gfor3"].model == "regfm_c1_phasor"
+    assert found["gfor3"].parameters["mp"] == 0.03
+    assert "sg3" not in found
+
+
 def test_the_share_of_a_converter_by_its_record_cannot_be_chosen(tables):
     assert tables(overrides={"units.alpha": 0.2})["gfor1"].model == "gfor"
     with pytest.raises(
