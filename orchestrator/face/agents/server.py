@@ -7,8 +7,9 @@ from typing import Any, ParamSpec, TypeVar
 
 from mcp.server import MCPServer
 from mcp.server.mcpserver import Context
-from mcp.server.mcpserver.exceptions import ToolError
+from mcp.server.mcpserver.exceptions import ToolError, UnexpectedToolError
 from mcp.types import CallToolResult, InputRequiredResult, Tool, ToolAnnotations
+from pydantic import ValidationError
 
 from orchestrator.core.errors import CosimError
 from orchestrator.face.agents.question import Allowance
@@ -61,9 +62,17 @@ class VerbServer(MCPServer[Any]):
     ) -> CallToolResult | InputRequiredResult:
         """Answer a question whose arguments the verb has."""
         schemas = {tool.name: tool.input_schema for tool in await super().list_tools()}
-        if name in schemas:
-            _check_names(name, arguments, schemas[name])
-        return await super().call_tool(name, arguments, context)
+        if name not in schemas:
+            raise ToolError(
+                f"{name[:_SHOWN]}: there is no such verb; there are: {', '.join(VERBS)}"
+            )
+        _check_names(name, arguments, schemas[name])
+        try:
+            return await super().call_tool(name, arguments, context)
+        except UnexpectedToolError:
+            raise
+        except ToolError as error:
+            raise ToolError(f"{name}: {_reason(error)}") from error.__cause__
 
 
 def _check_names(verb: str, given: dict[str, Any], schema: dict[str, Any]) -> None:
@@ -75,6 +84,15 @@ def _check_names(verb: str, given: dict[str, Any], schema: dict[str, Any]) -> No
         )
     if missing:
         raise ToolError(f"{verb}: give {missing[0]!r}; it takes: {', '.join(has)}")
+
+
+def _reason(error: ToolError) -> str:
+    """Return why a verb refused, without the words that the library puts before it."""
+    cause = error.__cause__
+    if isinstance(cause, ValidationError):
+        found = (f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in cause.errors())
+        return "; ".join(found)
+    return str(cause if isinstance(cause, ToolError) else error)
 
 
 def _with_errors(verb: Callable[_P, _R]) -> Callable[_P, _R]:

@@ -8,6 +8,7 @@ from mcp import Client, StdioServerParameters
 from mcp.client.stdio import stdio_client
 
 import orchestrator as gfor
+from orchestrator.face.agents.server import VERBS as IN_ORDER
 
 VERBS = {
     "cases",
@@ -51,6 +52,8 @@ def answers(tmp_path_factory):
         ("explain", {"case": "kundur", "scenario": "--out=x"}),
         ("modes", {"case": "two_area", "set": {"gfor.pod_p.K": 0}}),
         ("explain", {"case": "two_area"}),
+        ("scr", {"case": 5}),
+        ("power_flow", {}),
     )
 
 
@@ -96,7 +99,7 @@ def test_hostile_arguments_are_refused_in_words(answers):
 
 
 def test_an_argument_that_a_verb_has_not_is_refused_and_never_dropped(answers):
-    _, (tools, (*_, unknown, missing)) = answers
+    _, (tools, (*_, unknown, missing, _, _)) = answers
     assert unknown.is_error
     assert "modes: there is no argument 'set'; it takes: case, scenario, values" in (
         unknown.content[0].text
@@ -104,3 +107,18 @@ def test_an_argument_that_a_verb_has_not_is_refused_and_never_dropped(answers):
     assert missing.is_error
     assert "explain: give 'scenario'" in missing.content[0].text
     assert all(tool.input_schema["additionalProperties"] is False for tool in tools)
+
+
+def test_every_refusal_begins_with_its_verb_and_repeats_no_value(answers):
+    _, (_, (*_, outside, option, unknown, missing, number, nothing)) = answers
+    told = [one.content[0].text for one in (outside, option, unknown, missing, number, nothing)]
+    assert [text.partition(": ")[0] for text in told] == [
+        "modes",
+        "explain",
+        "modes",
+        "explain",
+        "scr",
+        "power_flow",
+    ]
+    assert told[-2] == "scr: case: Input should be a valid string"
+    assert told[-1].endswith("there are: " + ", ".join(IN_ORDER))
