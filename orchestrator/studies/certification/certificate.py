@@ -32,7 +32,9 @@ from orchestrator.studies.certification.request import (
 from orchestrator.studies.certification.verdict import (
     FAILS,
     INCOMPLETE,
+    NOT_ACCEPTED,
     PASSES,
+    REFUSED,
     incomplete_because,
     verdict_of,
 )
@@ -119,7 +121,9 @@ class Certificate:
         """The verdict, with what failed or was not tested."""
         said = self.test_in_words()
         if self.acceptance is not None and self.refused:
-            said += f" Acceptance tests failed: {', '.join(self.acceptance.faults)}; do not rely on the FMU as it is."
+            said += (
+                f"{REFUSED} {', '.join(self.acceptance.faults)}; do not rely on the FMU as it is."
+            )
         return said
 
     @property
@@ -151,7 +155,7 @@ class Certificate:
         rows = f"{len(judged) - len(bad)} of {len(judged)} judged rows are accepted."
         if bad:
             names = "; ".join(f"{v.name}: {', '.join(f.criterion for f in v.failed)}" for v in bad)
-            return f"{subject} {FAILS} {title}: {rows} Not accepted: {names}."
+            return f"{subject} {FAILS} {title}: {rows}{NOT_ACCEPTED} {names}."
         if self.verdict == INCOMPLETE:
             # as issued ones say, also of one part
             untested = f"{len(self.missing)} parts of {title} were not tested."

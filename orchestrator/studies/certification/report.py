@@ -22,7 +22,7 @@ from orchestrator.studies.certification.report_criteria import (
     damping_findings,
 )
 from orchestrator.studies.certification.texts import TEXTS
-from orchestrator.studies.certification.verdict import FAILS, INCOMPLETE, PASSES
+from orchestrator.studies.certification.verdict import FAILS, INCOMPLETE, PASSES, verdicts_on_page
 
 _LONGEST = 160  # characters of why a row is not accepted, at the top of the page
 _LINE = '<span class="blank"></span>'  # A line to be filled in by hand
@@ -224,19 +224,13 @@ def title(c: Certificate) -> str:
 
 def _findings(c: Certificate, own: Sequence[str]) -> str:
     """The verdict in one sentence, a line a row of the code, and what else was asked in short notes."""
-    good = c.passed and not c.refused
-    whole = c.sentence()
-    said = whole if isinstance(c, DampingCertificate) else whole.partition(" Not accepted:")[0]
-    sentences = [f'<b class="{"good" if good else "bad"}">{escape(said)}</b>']
-    checked = "not run"
-    if c.acceptance is not None:
-        checked = "no check failed" if c.acceptance.trusted else "FAILED"
-    if c.acceptance is not None and c.refused:
-        failed = f"ACCEPTANCE TESTS FAILED: {', '.join(c.acceptance.faults)}"
-        sentences.insert(0, f'<b class="bad">{escape(failed)}</b>')
-    notes = [f"Acceptance tests of the FMU (gfor fmu check): {checked}", *own]
-    if said != whole:
-        notes.append(f"<b>{escape(whole)}</b>")  # `gfor verify` looks for the record's own sentence
+    shade = "good" if c.passed and not c.refused else "bad"
+    sentences = [
+        f'<b class="{shade}">{escape(text)}</b>' for text in verdicts_on_page(c.sentence())
+    ]
+    checked = "not run" if c.acceptance is None else "no check failed"
+    checks = [] if c.refused else [f"Acceptance tests of the FMU (gfor fmu check): {checked}"]
+    notes = [*checks, *own]
     warnings = dict.fromkeys(
         text for result in c.results.values() for text in getattr(result, "warnings", ())
     )

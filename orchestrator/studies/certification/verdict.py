@@ -12,6 +12,17 @@ EXIT_CODES = {PASSES: 0, FAILS: 1, INCOMPLETE: 3}
 NOT_TRUSTED = 4  # exit code if the damping test is passed but an acceptance test of the FMU failed
 DOES_NOT_HOLD = 5  # exit code for a certificate with a contradiction, whose verdict is worthless
 
+NOT_ACCEPTED = " Not accepted:"
+REFUSED = " Acceptance tests failed:"
+"""Begins of the parts of a certificate's sentence that its page shows in a table and in a line of its own."""
+
+
+def verdicts_on_page(sentence: str) -> list[str]:
+    """Return what of a certificate's sentence stands on top of its page: failed acceptance tests, and the verdict."""
+    said, _, failed = sentence.partition(REFUSED)
+    refusal = [f"ACCEPTANCE TESTS FAILED:{failed}"] if failed else []
+    return [*refusal, said.partition(NOT_ACCEPTED)[0]]
+
 
 def verdict_of(accepted: Sequence[bool], missing: int) -> str:
     if not all(accepted):

@@ -2,7 +2,7 @@
 computed anew."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from html import escape
@@ -36,7 +36,7 @@ from orchestrator.studies.certification.form import case_files, check_form
 from orchestrator.studies.certification.kinds import Parts, parts_of, rebuilt
 from orchestrator.studies.certification.page_again import PageSeen, look_at_page, views_beside
 from orchestrator.studies.certification.signed import Asked, look_at_signature
-from orchestrator.studies.certification.verdict import INCOMPLETE, PASSES
+from orchestrator.studies.certification.verdict import INCOMPLETE, PASSES, verdicts_on_page
 from orchestrator.studies.points.executor import Executor
 from orchestrator.studies.points.points import CountReport, nobody
 
@@ -96,7 +96,9 @@ def _compare_page(page: Path, content: dict[str, Any], found: Verification) -> N
     if not page.is_file():
         return
     text = page.read_text(encoding="utf-8", errors="replace")
-    if f">{escape(content['sentence'])}</b>" not in text:
+    shown = text.replace("\N{NO-BREAK SPACE}", " ")
+    sentence = content["sentence"]  # which pages of earlier versions hold as a whole
+    if not (_holds(shown, [sentence]) or _holds(shown, verdicts_on_page(sentence))):
         found.faults.append(f"{HTML}: it does not hold the verdict's sentence of {JSON}")
     if figures_hash(content) not in text:
         found.faults.append(
@@ -104,6 +106,11 @@ def _compare_page(page: Path, content: dict[str, Any], found: Verification) -> N
         )
     else:
         found.agreed.append(f"{HTML}: the hash of the figures that it shows")
+
+
+def _holds(page: str, verdicts: Iterable[str]) -> bool:
+    """Return whether a page shows verdicts in the type that it has for them."""
+    return all(f">{escape(one)}</b>" in page for one in verdicts)
 
 
 def _judged_again(

@@ -4,6 +4,7 @@ import json
 import shutil
 import zipfile
 from dataclasses import replace
+from html import escape
 
 import numpy as np
 import pytest
@@ -16,9 +17,12 @@ from orchestrator.face.cli import main
 from orchestrator.studies.certification import acceptance, kinds, points_again
 from orchestrator.studies.certification import study as study_module
 from orchestrator.studies.certification.case_file import write_case
+from orchestrator.studies.certification.compared import Verification
 from orchestrator.studies.certification.files import figures_hash, write_sealed
 from orchestrator.studies.certification.point import POWER
 from orchestrator.studies.certification.request import REACTANCES, CertificationRequest
+from orchestrator.studies.certification.verdict import verdicts_on_page
+from orchestrator.studies.certification.verification import _compare_page
 from tests.studies.certification.fabricated import rings
 from tests.studies.certification.test_recomputing import BOUND
 
@@ -456,3 +460,25 @@ def test_a_report_in_which_nothing_was_passed_is_refused(tmp_path, fmu_path):
     checks[0]["verdict"] = "pass"
     path.write_text(json.dumps(report), encoding="utf-8")
     assert acceptance.read_checks(path, fmu, None).trusted
+
+
+@pytest.mark.parametrize(
+    ("lost", "faults"),
+    [
+        ("", 0),
+        ("3 of 5 judged rows are accepted.", 1),
+        ("ACCEPTANCE TESTS FAILED: crash; do not rely on the FMU as it is.", 1),
+    ],
+)
+def test_a_page_that_hides_a_verdict_or_failed_acceptance_tests_is_found(tmp_path, lost, faults):
+    content = {
+        "sentence": "The converter 'x' fails MISO: 3 of 5 judged rows are accepted. Not accepted: rocof: settles. "
+        "Acceptance tests failed: crash; do not rely on the FMU as it is."
+    }
+    shown = "".join(f"<b>{escape(one)}</b>" for one in verdicts_on_page(content["sentence"]))
+    page = tmp_path / "certificate.html"
+    page.write_text(f"{shown.replace(lost, '')}{figures_hash(content)}", encoding="utf-8")
+    found = Verification()
+    _compare_page(page, content, found)
+    assert len(found.faults) == faults
+    assert "rocof" not in shown  # the rows' table says it
