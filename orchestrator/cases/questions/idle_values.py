@@ -11,8 +11,8 @@ from orchestrator.systems.coupling.system import System
 
 _SHOWN = 3
 
-# parts of converters that act by a gain ``K`` and have no effect at rest
-DAMPING_CONTROLLERS = ("pod_p", "pod_q")
+DAMPING_CONTROLLERS = {"pod_p": "POD-P", "pod_q": "POD-Q"}
+"""Parts of converters that act by a gain ``K`` and have no effect at rest, by the names that planners give them."""
 
 Idle = Mapping[str, Problem | None]
 """By ``component.variable``, all values that somebody gave; with a question where one cannot act."""

@@ -34,6 +34,7 @@ from orchestrator.face.cli.terminal import (
     warn,
 )
 from orchestrator.face.cli.verdict import add_verdict_argument, exit_code, print_stability
+from orchestrator.output.results.manifest import made_now
 from orchestrator.output.results.origin import as_typed
 from orchestrator.studies.coordinated_design.command import STUDY
 from orchestrator.studies.coordinated_design.one_point import design_controller
@@ -119,7 +120,7 @@ def run(options: argparse.Namespace) -> int:
         rmtree(folder, ignore_errors=True)
     ends = exit_code(options, [design.stability]) or (0 if design.met else NOT_MET)
     if options.json:
-        print_json(controller.as_json(path))
+        print_json(controller.as_json(path) | {"made": made_now()})
         return ends
     console = make_console(names=design.prepared.names)
     print_parts(console, first_screen(design))

@@ -1,7 +1,7 @@
 """A study of many points as a command: options, the folder, what is printed, and the last line."""
 
 import argparse
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -11,6 +11,7 @@ from rich.console import Console, RenderableType
 from rich.markup import escape
 
 from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.core.errors import number_of
 from orchestrator.core.safe_files import made_folder
 from orchestrator.face.api.progress import shown_progress
 from orchestrator.face.cli import arguments
@@ -28,6 +29,7 @@ from orchestrator.face.cli.terminal import (
 from orchestrator.face.cli.verdict import add_verdict_argument
 from orchestrator.output.report.progress import progress_bar
 from orchestrator.output.results.lock import hold_folder
+from orchestrator.output.results.manifest import made_now
 from orchestrator.studies.points.executor import Executor
 from orchestrator.studies.points.parts_done import counting
 from orchestrator.studies.points.points import CountReport
@@ -171,7 +173,7 @@ def print_study(
     if not end:
         stored = f", {result.stored} were there already" if result.stored else ""
         files = ", ".join(path.name for path in written)
-        end = f"{result.computed} {study.counted} computed{stored}. Results in {folder}: {files}"
+        end = f"{number_of(result.computed, study.counted[:-1])} computed{stored}. Results in {folder}: {files}"
     say("warning", study.warnings(found))
     present(options, found.as_json, study.parts(found), study.remarks(found), end, prepared)
     return study.code(found, options.fail_unstable)
@@ -179,7 +181,7 @@ def print_study(
 
 def present(
     options: argparse.Namespace,
-    as_json: Callable[[], object],
+    as_json: Callable[[], Mapping[str, Any]],
     parts: Iterable[RenderableType],
     remarks: Iterable[str] = (),
     end: str = "",
@@ -191,7 +193,7 @@ def present(
     names = prepared[0].names if prepared else None
     console = make_console(stderr=options.json, names=names)
     if options.json:
-        print_json(as_json())
+        print_json({**as_json(), "made": made_now()})
     else:
         print_parts(console, parts)
     for text in remarks:

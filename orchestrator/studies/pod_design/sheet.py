@@ -6,7 +6,9 @@ from collections.abc import Iterable, Sequence
 from rich.markup import escape
 from rich.table import Table
 
+from orchestrator.cases.questions.idle_values import DAMPING_CONTROLLERS
 from orchestrator.core.options import Option
+from orchestrator.core.spelling import joined
 from orchestrator.linear.spectra.modes import Mode, damping_ratio
 from orchestrator.linear.spectra.stability import Stability
 from orchestrator.output.report.mode_tables import eigenvalue_text
@@ -21,7 +23,6 @@ from orchestrator.studies.pod_design.margins import LARGER_GAIN, Margins
 from orchestrator.studies.pod_design.refinement import GainSweep, Refinement
 
 _MARK = "†"  # mark behind a swept gain with which the system is unstable
-LABELS = {"pod_p": "POD-P", "pod_q": "POD-Q"}
 
 
 def sheet(d: PodDesign) -> Iterable[Table | str]:
@@ -30,7 +31,7 @@ def sheet(d: PodDesign) -> Iterable[Table | str]:
         f"component {names[0]}" if len(names) == 1 else f"{len(names)} components with one setting"
     )
     yield (
-        f"[bold]{LABELS[d.request.controller]} design by eigenvalue sensitivity[/bold]: "
+        f"[bold]{DAMPING_CONTROLLERS[d.request.controller]} design by eigenvalue sensitivity[/bold]: "
         + escape(f"{d.case}, scenario {d.target.scenario}, mode {d.mode_name}, {components}")
     )
     steps = [(str(number), *row) for number, row in enumerate(_steps(d), start=1)]
@@ -55,7 +56,7 @@ def first_screen(d: PodDesign) -> Iterable[Table | str]:
     for title, around, target, stability in (
         ("as it is, the controller off", d.before, d.initial, d.stability_before),
         (
-            f"{LABELS[d.request.controller]}, {_setting(d)}",
+            f"{DAMPING_CONTROLLERS[d.request.controller]}, {_setting(d)}",
             d.after,
             d.final.eigenvalue,
             d.stability,
@@ -166,7 +167,7 @@ def _swept(s: GainSweep) -> tuple[str, ...]:
         s.why,
         *([f"{s.filters.T_S1:.4f}", f"{s.filters.T_S2:.4f}"] if s.filters.T_S2 else ["–", "–"]),
         dampings or f"{gains[0]:g}…{gains[-1]:g} ({len(gains)})",
-        f"K = {chosen}: {percent(s.chosen.damping_ratio)}",
+        f"K = {chosen} pu: {percent(s.chosen.damping_ratio)}",
         "–" if s.chosen_least is None else percent(s.chosen_least),
     )
 
@@ -189,9 +190,9 @@ def _margins(m: Margins, d: PodDesign) -> Table:
     lost = f"no eigenvalue unstable, no mode from 0.1 to 2 Hz below {percent(m.limit)}"
     up, down = f"more than × {m.reach:g}, the most tried", "down to 0"
     if m.up is not None and m.lost_up is not None:
-        up = f"× {m.up:.2f} (K = {m.up * gain:.0f}), then {mode_text(m.lost_up)} is lost"
+        up = f"× {m.up:.2f} (K = {m.up * gain:.0f} pu), then {mode_text(m.lost_up)} is lost"
     if m.down is not None and m.lost_down is not None:
-        down = f"× {m.down:.2f} (K = {m.down * gain:.0f}), then {mode_text(m.lost_down)} is lost"
+        down = f"× {m.down:.2f} (K = {m.down * gain:.0f} pu), then {mode_text(m.lost_down)} is lost"
     rows = [(f"Gain up, {lost}", up), ("Gain down, the same", down), *_loop_rows(m)]
     rows += [
         (f"Damping of the target with {name}, the rest as it is", percent(z))
@@ -218,53 +219,71 @@ def _loop_rows(m: Margins) -> Iterable[tuple[str, str]]:
 
 
 def verdict(d: PodDesign) -> str:
-    text = f"the target has {percent(d.achieved_damping)} of damping, {percent(d.required_damping)} are required"
+    """Return the target's damping beside the required one, and what stands in the way of relying on it."""
+    target = f"the target has {percent(d.achieved_damping)} of damping, {percent(d.required_damping)} are required"
+    parts = [target, *_of_the_modes(d), *_of_the_margin(d), *_of_the_bounds(d)]
+    return joined("; ", parts)
+
+
+def remarks(d: PodDesign) -> list[str]:
+    """Return the verdict without the target's damping and the margin, which a report has as figures."""
+    return [*_of_the_modes(d), *_of_the_bounds(d)]
+
+
+def _of_the_modes(d: PodDesign) -> Iterable[str]:
+    """Yield what became of the target and of the other modes, and which gain does it."""
     if d.after.other_named:
-        text += (
-            f"; with this gain two modes have traded places: the one that was followed is at "
+        yield (
+            f"with this gain two modes have traded places: the one that was followed is at "
             f"{eigenvalue_text(d.final.eigenvalue)} rad/s with {percent(d.final.damping_ratio)}, the one that the case "
             f"now calls {d.mode_name} has {percent(d.after.other_named.damping_ratio)}, and the lesser counts"
         )
     if d.broken:
-        text += f"; but {d.broken}"
+        yield f"but {d.broken}"
     elif d.met and (other := d.worst_other) and other.damping_ratio < d.required_damping:
-        text += f"; least damped of all then {percent(other.damping_ratio)} at {other.frequency_hz:.3f} Hz"
+        yield f"least damped of all then {percent(other.damping_ratio)} at {other.frequency_hz:.3f} Hz"
     if d.gain_is_swept:
-        text += (
-            f"; K = {d.final.setting.gain:.4g} pu stands in the place of the equations' {d.gain:.4g} pu, with which "
+        yield (
+            f"K = {d.final.setting.gain:.4g} pu stands in the place of the equations' {d.gain:.4g} pu, with which "
             f"the target has {percent(d.designed.damping_ratio)}"
         )
-    if d.damping_met:
-        if d.thin_margin is not None:
-            text += (
-                f"; no margin: {percent(d.achieved_damping)} at K = {d.final.setting.gain:.4g} pu, and "
-                f"{percent(d.thin_margin)} at {LARGER_GAIN}"
-            )
-        if d.met and d.spoilt:
-            text += f"; no margin: at {LARGER_GAIN} {d.spoilt}"
-        if d.final is d.designed and d.active_bound == "lower":
-            text += (
-                f"; the lower bound of the gain is active, {d.unbounded_gain:.4g} pu were computed before it: "
-                + Option.GAIN_BOUNDS
-                + f" 0:{d.request.bounds(search=True)[1]:g} "
-                + Option.REFINE
-                + " finds the least gain that meets it"
-            )
-        return text
-    return text + (_out_of_reach(d, d.refinement) if d.refinement else _other_gain(d))
+
+
+def _of_the_margin(d: PodDesign) -> Iterable[str]:
+    if d.damping_met and d.thin_margin is not None:
+        yield (
+            f"no margin: {percent(d.achieved_damping)} at K = {d.final.setting.gain:.4g} pu, and "
+            f"{percent(d.thin_margin)} at {LARGER_GAIN}"
+        )
+    if d.met and d.spoilt:
+        yield f"no margin: at {LARGER_GAIN} {d.spoilt}"
+
+
+def _of_the_bounds(d: PodDesign) -> Iterable[str]:
+    """Yield what the bounds of the gain did, or where the damping is short, what another setting has."""
+    if not d.damping_met:
+        yield _out_of_reach(d, d.refinement) if d.refinement else _other_gain(d)
+    elif d.final is d.designed and d.active_bound == "lower":
+        yield (
+            f"the lower bound of the gain is active, {d.unbounded_gain:.4g} pu were computed before it: "
+            + Option.GAIN_BOUNDS
+            + f" 0:{d.request.bounds(search=True)[1]:g} "
+            + Option.REFINE
+            + " finds the least gain that meets it"
+        )
 
 
 def _other_gain(d: PodDesign) -> str:
     """Return what another gain does with the design's lead/lag."""
     if d.other_gain is None:
-        return "; use " + Option.REFINE
+        return "use " + Option.REFINE
     low, high = d.request.bounds(search=False)
     gain, there = f"K = {d.other_gain.setting.gain:.4g} pu", percent(d.other_gain.damping_ratio)
     if d.other_gain.damping_ratio >= d.required_damping:
-        cost = f"; {gain} with the same lead/lag has {there}, at the cost of another mode: use "
+        cost = f"{gain} with the same lead/lag has {there}, at the cost of another mode: use "
         return cost + Option.REFINE
     return (
-        f"; with this lead/lag no gain from {low:g} to {high:g} pu has more than {there}, at {gain}: see with "
+        f"with this lead/lag no gain from {low:g} to {high:g} pu has more than {there}, at {gain}: see with "
         + Option.REFINE
         + " what another one does"
     )
@@ -273,10 +292,10 @@ def _other_gain(d: PodDesign) -> str:
 def _out_of_reach(d: PodDesign, r: Refinement) -> str:
     """Why the sweeps show that the requirement is out of reach."""
     if not r.sweeps:
-        return "; the refinement could not follow the mode with any setting within the bounds"
+        return "the refinement could not follow the mode with any setting within the bounds"
     low, high = d.request.bounds(search=True)
     text = (
-        f"; no setting with K from {low:g} to {high:g} pu was found that meets it, of {len(r.sweeps)} lead/lag "
+        f"no setting with K from {low:g} to {high:g} pu was found that meets it, of {len(r.sweeps)} lead/lag "
         "settings swept over the gain"
     )
     if r.even is not None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.form.parameter_files import parameter_file_text
+from orchestrator.cases.questions.idle_values import DAMPING_CONTROLLERS
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError
 from orchestrator.core.late import pd
@@ -22,7 +23,7 @@ from orchestrator.studies.pod_design.closed_loop import Placed
 from orchestrator.studies.pod_design.design import PodDesign
 from orchestrator.studies.pod_design.lead_lag import LeadLag, angle_deg
 from orchestrator.studies.pod_design.margins import Margins
-from orchestrator.studies.pod_design.sheet import LABELS, mode_text, percent, verdict
+from orchestrator.studies.pod_design.sheet import mode_text, percent, remarks, verdict
 
 
 class ControllerDesign(NoTruth, ask=".met"):
@@ -158,6 +159,7 @@ def design_json(d: PodDesign) -> dict[str, Any]:
         },
         "met": d.met,
         "verdict": verdict(d),
+        "remarks": remarks(d),
         **(
             {"thin_margin_damping_ratio": d.thin_margin, "larger_gain_spoils": d.spoilt}
             if d.margins
@@ -207,7 +209,7 @@ def provenance(d: PodDesign, command: str) -> list[str]:
     elif d.gain_is_swept:
         how += ", with a better gain than the equations'"
     return [
-        f"{LABELS[d.request.controller]} for {d.case}, {how}",
+        f"{DAMPING_CONTROLLERS[d.request.controller]} for {d.case}, {how}",
         f"command: {command}",
         f"scenario {d.target.scenario}, mode {d.mode_name} without the controller: {mode_text(d.initial)}",
         f"with it: {mode_text(d.achieved)}; required: {percent(d.required_damping)} ({'met' if d.met else 'not met'})",

@@ -207,7 +207,9 @@ def _confirmed(result: SiteResult, one: Confirmation, before: float) -> str:
     word = "confirmed" if one.agrees else "NOT CONFIRMED"
     steps = f"{before:.2f} % → {one.damping_alone:.2f} % with {_rated(result)}"
     if one.setting is not None:
-        steps += f" → {one.damping:.2f} % with its POD (K {one.setting.gain:g}{end_of_search(one)})"
+        steps += (
+            f" → {one.damping:.2f} % with its POD (K {one.setting.gain:g} pu{end_of_search(one)})"
+        )
     if one in result.breaking:
         word += ", but UNSTABLE with it (`gfor modes` of a case with it tells the cause, often the step)"
     return (

@@ -58,7 +58,7 @@ def _answer_with_notes(chapter: Chapter, answer: str, notes: dict[str, str]) -> 
     below = [
         ("How sure", escape(short(chapter.sure, 2 * _LONGEST))),
         ("Not judged", "; ".join(_not_judged(chapter, notes))),
-        ("Results", escape(", ".join(_places_and_options(chapter)))),
+        ("Results", escape(", made by ".join(_places_and_options(chapter)))),
     ]
     told = "".join(f"<li>{name}: {text}</li>" for name, text in below if text)
     question = f'<p class="question">{escape(chapter.question)}</p>'

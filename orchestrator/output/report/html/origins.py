@@ -54,6 +54,8 @@ def made_of(source: Path, origin: Mapping[str, Any]) -> list[str]:
     listed = origin.get("inputs", origin.get("sealed", {}))
     versions = origin.get("made_by", {}).get("gfor-cosim")
     inputs = ", ".join(f"{name} {str(of)[:8]}" for name, of in listed.items() if of)
+    if "inputs" in origin and not inputs:
+        inputs = "none: the case is built in"
     date = (
         origin.get("date")
         or f"{datetime.fromtimestamp(source.stat().st_mtime, UTC):%Y-%m-%d %H:%M} (the file's)"

@@ -107,7 +107,11 @@ def page(
 
 def _title_of(places: Sequence[Path], headings: Sequence[str]) -> str:
     """Name a page without a run: by its one study, or by where the results lie."""
-    return headings[0] if len(headings) == 1 else f"Report on {', '.join(map(_name, places))}"
+    return (
+        headings[0]
+        if len(headings) == 1
+        else f"Report on {', '.join(place.resolve().name for place in places)}"
+    )
 
 
 def _names_of(chapters: Sequence[Chapter], runs: Sequence[Results]) -> ElementNames:

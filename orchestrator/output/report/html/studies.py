@@ -217,8 +217,8 @@ def design(sheet: dict[str, Any]) -> str:
     )
     settings = [
         *lead_lag,
-        ["K", f"{sheet['K']:.1f}"],
-        ["K before its bounds", f"{sheet['K_unbounded']:.1f}"],
+        ["K [pu]", f"{sheet['K']:.1f}"],
+        ["K before its bounds [pu]", f"{sheet['K_unbounded']:.1f}"],
     ]
     rows = []
     for name, mode in modes.items():
@@ -238,18 +238,15 @@ def design(sheet: dict[str, Any]) -> str:
         after = sheet["stability"]["after"]
         shade = {True: "good", False: "bad"}.get(after["stable"], "soft")
         extra.append(f'<p class="{shade}">With the final setting: {escape(after["sentence"])}</p>')
-    if "verdict" in sheet:
-        state = "good" if sheet.get("met") else "bad"
-        extra.append(f'<p class="{state}">{escape(sheet["verdict"])}</p>')
     if sheet.get("components"):
         extra.append(
             f"<p>Case {escape(sheet['case'])}, scenario {escape(sheet['scenario'])}, {escape(sheet['mode'])} mode; "
             f"set on {escape(', '.join(sheet['components'][:6]))}"
             + (f" … {len(sheet['components'])} in all" if len(sheet["components"]) > 6 else "")
-            + f". Finite difference with ΔK = {sheet['requirement']['delta_gain']:g}.</p>"
+            + f". Finite difference with ΔK = {sheet['requirement']['delta_gain']:g} pu.</p>"
         )
     return "".join(extra) + (
-        f"<p>Non-compensated eigenvalue sensitivity {sensitivity['magnitude']:.4g} ∠ "
+        f"<p>Non-compensated eigenvalue sensitivity {sensitivity['magnitude']:.4g} rad/s per pu ∠ "
         f"{number(sensitivity['phase_deg'], 1)}°{needed}.</p>"
         + table("Setting", ["Parameter", "Value"], settings)
         + table("Modes", ["Mode", "λ [rad/s]", "f [Hz]", "Damping [%]"], rows)

@@ -7,6 +7,7 @@ from typing import Any
 
 import xarray as xr
 
+from orchestrator.cases.questions.idle_values import DAMPING_CONTROLLERS
 from orchestrator.core.errors import number_of
 from orchestrator.core.truth import all_true
 from orchestrator.output.report.colours import colour
@@ -77,10 +78,11 @@ def of_site(file: Path, c: Content) -> Chapter:
 
 
 def of_design(file: Path, c: Content) -> Chapter:
+    controller = DAMPING_CONTROLLERS.get(c["controller"], c["controller"])
     before, after = (100 * c[f"{when}_damping_ratio"] for when in ("target", "achieved"))
     wanted = 100 * c["requirement"]["damping_ratio"]
     answer = (
-        f"{'yes' if c['met'] else 'not as required'}: with K = {c['K']:.4g} the mode has {after:.2f} % of damping, "
+        f"{'yes' if c['met'] else 'not as required'}: with K = {c['K']:.4g} pu the mode has {after:.2f} % of damping, "
         f"{before:.2f} % before, {wanted:.2f} % wanted"
     )
     thin = c.get("thin_margin_damping_ratio")
@@ -89,17 +91,18 @@ def of_design(file: Path, c: Content) -> Chapter:
     spoilt = c.get("larger_gain_spoils")
     if c["met"] and spoilt:
         answer += f"; no margin: with 20 % more gain {spoilt}"
-    sure = f"closed loop of the coupled FMUs: {c['verdict']}"
+    told = c.get("remarks", [c["verdict"]])  # results of earlier versions have the verdict alone
+    sure = "; ".join(["closed loop of the coupled FMUs", *told])
     modes = {word: [c[f"{which}_mode"]] for word, which in _DESIGNED.items()}
     content = modes_map("The mode that was designed for", modes) + studies.design(dict(c))
     return Chapter(
         file,
-        f"Does {c['controller']} damp the {c['mode']} mode?",
+        f"Does {controller} damp the {c['mode']} mode?",
         answer,
         bool(c["met"]),
         sure,
         content=content,
-        title=f"Design of {c['controller']}",
+        title=f"Design of {controller}",
     )
 
 
