@@ -14,6 +14,7 @@ from orchestrator.core.errors import InputError
 from orchestrator.output.report.html.chapters.files import chapters_of
 from orchestrator.output.report.html.chapters.runs import of_run
 from orchestrator.output.report.html.chapters.studies import of_site, of_sweep
+from orchestrator.output.report.html.elements import with_units_held
 from orchestrator.output.report.html.first_page import first_page
 from orchestrator.output.report.html.least_damped import LeastDamped
 from orchestrator.output.report.html.page import write_report
@@ -219,11 +220,18 @@ def written(folders, tmp_path, **more):
     )
 
 
+def test_a_headline_breaks_nowhere_between_a_figure_and_its_unit():
+    held = with_units_held('<p class="verdict"><b>−0.90 % at 2 of 3, 12 s</b></p><pre>12 s</pre>')
+    assert held == (
+        '<p class="verdict"><b>−0.90\N{NO-BREAK SPACE}% at 2 of 3, 12\N{NO-BREAK SPACE}s</b></p><pre>12 s</pre>'
+    )
+
+
 def test_the_first_page_answers_every_study(folders, tmp_path):
     text = written(folders, tmp_path)
     first = text[: text.index("<section")]
     for said in (
-        "not as required: with K = 200 the mode has 18.00 % of damping, 10.60 % before, 20.00 % wanted",
+        "not as required: with K = 200 pu the mode has 18.00 % of damping, 10.60 % before, 20.00 % wanted",
         "not known whether stable everywhere: 2 operating points, 3 outages; least damped 0.930 Hz, 3.80 %",
         "mon, sg3: no power flow: sg5 would need 129 %",
         "growth outside of the range was counted at some points only",
@@ -293,6 +301,7 @@ def test_a_runs_row_says_what_was_given_and_which_models_were_run(gfor, tmp_path
     )
     assert gfor("run", "two_area_rms", "--scenario", "gfor", *given, "--out", tmp_path)[0] == 0
     text = write_report(tmp_path, short=True).read_text(encoding="utf-8")
+    text = text.replace("\N{NO-BREAK SPACE}", " ")
     assert (
         "SG + GFOR, with fault &quot;bus_2, 5 ms, from 2 ms&quot;, models = emt: not known" in text
     )
@@ -709,7 +718,21 @@ def test_a_result_is_not_told_with_the_command_of_a_later_one(tmp_path):
 def test_a_design_at_the_edge_says_that_there_is_no_margin(tmp_path):
     thin = SHEET | {"met": True, "thin_margin_damping_ratio": 0.0957}
     text = written([made(tmp_path / "thin", "design", thin)], tmp_path)
-    assert "20.00 % wanted; no margin: 9.57 % with 20 % more gain" in text
+    headline = text[: text.index("<section")].replace("\N{NO-BREAK SPACE}", " ")
+    assert "20.00 % wanted; no margin: 9.57 % with 20 % more gain" in headline
+
+
+def test_a_design_says_its_figures_once_with_units_and_by_the_planners_name(tmp_path):
+    remark = "the lower bound of the gain is active, 18.45 pu were computed before it"
+    said = f"the target has 18.00 % of damping, 20.00 % are required; {remark}"
+    sheet = SHEET | {"controller": "pod_p", "verdict": said, "remarks": [remark]}
+    text = written([made(tmp_path / "one", "design", sheet)], tmp_path)
+    text = text.partition('id="answers"')[0].replace("\N{NO-BREAK SPACE}", " ")
+    assert "<h1>Design of POD-P</h1>" in text
+    assert "pod_p" not in text
+    assert text.count(remark) == 1
+    assert "the target has" not in text
+    assert "with K = 200 pu the mode" in text
     assert "no margin" not in written(
         [made(tmp_path / "wide", "design", SHEET | {"met": True})], tmp_path
     )

@@ -1,6 +1,7 @@
 """Pieces of HTML: tables, figures with numbers, texts that are safe to put in a page, and the page around them."""
 
 import json
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from html import escape
@@ -83,6 +84,22 @@ def paragraphs(good: bool | None, texts: Sequence[str]) -> str:
     )
 
 
+_UNIT = re.compile(r"(?<=\d) (?=(?:%|°|Hz|s|ms|pu|rad/s|1/s|k?V|k?A|k?W|MW|Mvar|MVA)(?![\w/]))")
+_HEADLINE = re.compile(r'<p class="verdict">.*?</p>|<span class="remark">.*?</span>', re.DOTALL)
+_TAG = re.compile(r"(<[^>]*>)")
+
+
+def with_units_held(findings: str) -> str:
+    """Return what stands on top of a page, with every figure beside its unit in verdicts and remarks."""
+    return _HEADLINE.sub(_held, findings)
+
+
+def _held(found: re.Match[str]) -> str:
+    parts = _TAG.split(found[0])
+    parts[::2] = [_UNIT.sub("\N{NO-BREAK SPACE}", text) for text in parts[::2]]
+    return "".join(parts)
+
+
 _HERE = Path(__file__).parent
 
 
@@ -110,7 +127,7 @@ def document(
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{escape(title)}</title><link rel="icon" href="data:,"><style>{_text("page.css")}{_footer(title)}</style></head>
 <body><main><header><h1>{escape(title)}</h1><div class="soft">{escape(kind)} · {made}</div></header>
-{f"<nav>{links}</nav>" if len(content) > 1 else ""}{findings}{body}</main>
+{f"<nav>{links}</nav>" if len(content) > 1 else ""}{with_units_held(findings)}{body}</main>
 <div id="tooltip" role="status"></div><script>{_text("page.js")}</script></body></html>
 """
 

@@ -34,4 +34,19 @@ for (const chart of document.querySelectorAll('svg[data-kind="lines"]')) {
   });
   chart.addEventListener("pointerleave", () => { hide(); cursor.removeAttribute("d"); });
 }
+// In a narrow window, a table that does not fit shows a row as a card: each cell below its heading.
+const MOST_CARDS = 24;
+function fit() {
+  for (const box of document.querySelectorAll(".scroll")) {
+    const rows = box.querySelectorAll("tbody tr");
+    box.classList.remove("cards");
+    if (innerWidth > 700 || rows.length > MOST_CARDS || box.scrollWidth <= box.clientWidth + 1) continue;
+    box.classList.add("cards");
+    const heads = [...box.querySelectorAll("thead th")].map(cell => cell.textContent);
+    for (const row of rows) [...row.children].forEach((cell, k) => { cell.dataset.head = heads[k] ?? ""; });
+  }
+}
+addEventListener("resize", fit);
+addEventListener("toggle", fit, true); // a table in <details> has no width before it is opened
+fit();
 addEventListener("beforeprint", () => { for (const d of document.querySelectorAll("details[data-print]")) d.open = true; });
