@@ -9,6 +9,7 @@ from orchestrator.output.report.verdict_sentence import VerdictSentence
 from orchestrator.studies.coordinated_design.objective import APART
 from orchestrator.studies.coordinated_design.study import PointsDesign
 from orchestrator.studies.coordinated_design.verdict import MORE, PointsVerdict
+from orchestrator.studies.operating_points.words import all_items, counted_items
 
 _SHOWN = 4
 _AT_BOUND = 1e-2  # part of the largest gain within which one stands at it
@@ -31,7 +32,7 @@ def verdict_of(verdict: PointsVerdict) -> VerdictSentence:
             which = f" of {few(verdict.names, _SHOWN)}"
         tail = f"; least damped{which}: {limiting.where}: {limiting.target.words}{unmoved}"
     tail += _of_all_modes(verdict)
-    aim = "" if wanted is None else f"{100 * wanted:g} % at all {total} points and outages"
+    aim = "" if wanted is None else f"{100 * wanted:g} % at {all_items(total)}"
     if verdict.met and wanted is not None:
         return _reached(verdict, wanted, aim, tail)
     tail += _standing_apart(verdict)
@@ -77,7 +78,7 @@ def _reached(verdict: PointsVerdict, wanted: float, aim: str, tail: str) -> Verd
 def _least_of_points(verdict: PointsVerdict) -> str:
     """The least damping of all points before, and the point where it became lower: each with its mode."""
     before, total = verdict.limiting_before, len(verdict.points)
-    text = f"the least damping of all {total} points and outages"
+    text = f"the least damping of {all_items(total)}"
     if before is not None and before.target_before is not None:
         text += f" was that of {before.where}: {before.target_before.words}"
     if not verdict.lowered:
@@ -110,7 +111,7 @@ def _standing_apart(verdict: PointsVerdict) -> str:
     places = len({id(one) for one, _ in verdict.apart})
     bound = f"less than {100 * APART:.1g} points with K ≤ {verdict.largest:g} pu"
     return (
-        f"; apart, at {places} of {len(verdict.points)} points and outages, stand modes that these controllers move by "
+        f"; apart, at {counted_items(places, len(verdict.points))}, stand modes that these controllers move by "
         f"{bound}; the least damped: {point.where}: {mode.words}"
     )
 

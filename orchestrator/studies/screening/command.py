@@ -11,7 +11,14 @@ from orchestrator.studies.screening.point import StretchTask
 from orchestrator.studies.screening.request import ScreeningRequest
 from orchestrator.studies.screening.study import plan_screening, run_screening
 from orchestrator.studies.screening.trips import runs_table
-from orchestrator.studies.screening.view import Screening, modes_table, overview, remarks, verdict
+from orchestrator.studies.screening.view import (
+    Screening,
+    modes_table,
+    no_modes,
+    overview,
+    remarks,
+    verdict,
+)
 
 
 def _parts(found: Screening) -> Iterator[RenderableType]:
@@ -25,7 +32,7 @@ def _parts(found: Screening) -> Iterator[RenderableType]:
     ran = runs_table(found.summary)
     if ran is not None:
         yield from ("", ran)
-    yield from ("", modes_table(found.summary), "")
+    yield from ("", no_modes(found.summary) or modes_table(found.summary), "")
 
 
 def _code(found: Screening, fail_unstable: bool) -> int:

@@ -304,6 +304,15 @@ def _cell(item: ScreenedItem | None) -> str | Marked:
     return "more" if least is None else damping(least.damping)
 
 
+def no_modes(summary: Summary) -> str:
+    """Return the sentence in the place of the modes; "" where there are some, or nothing is known."""
+    wanted = summary.result.plan.wanted
+    if summary.modes or not summary.counts[Status.COMPUTED]:
+        return ""
+    band = f"{wanted.lowest_hz:g} to {wanted.highest_hz:g} Hz"
+    return f"No mode from {band} is damped by less than {100 * wanted.damping:g} %."
+
+
 def modes_table(
     summary: Summary, most: int = 12, *, whole: bool = False
 ) -> ColumnTable[ScreenedMode]:
@@ -458,12 +467,11 @@ def _page(summary: Summary) -> str:
     ran = runs_table(summary, 20)
     if ran is not None:
         content.append(("Runs of the outages", ran.html()))
-    content += [("Modes", modes_table(summary, 20, whole=True).html())]
-    content += [("Damping and how long", _durations(summary, figures))]
-    if len(plan.points) > 1:
-        content.append(("Damping over the points", _over_points(summary, figures)))
-    content.append(("All critical modes", _plane(summary, figures)))
-    content.append(("Where a damping controller helps", _ranking(summary)))
+    if summary.modes:
+        content += _of_modes(summary, figures)
+    else:
+        none = no_modes(summary) or "No point has modes that are known."
+        content.append(("Modes", f"<p>{none}</p>"))
     failed = list(summary.failures())
     if failed:
         shown = ColumnTable(
@@ -484,6 +492,17 @@ def _page(summary: Summary) -> str:
         f'<p class="soft">{escape(sure)}</p></div>'
     )
     return document(title, kind, findings, content, names=plan.prepared.names)
+
+
+def _of_modes(summary: Summary, figures: Figures) -> list[tuple[str, str]]:
+    """The sections on critical modes; a single operating point has no durations and no course."""
+    content = [("Modes", modes_table(summary, 20, whole=True).html())]
+    if len(summary.result.plan.points) > 1:
+        content.append(("Damping and how long", _durations(summary, figures)))
+        content.append(("Damping over the points", _over_points(summary, figures)))
+    content.append(("All critical modes", _plane(summary, figures)))
+    content.append(("Where a damping controller helps", _ranking(summary)))
+    return content
 
 
 def _durations(summary: Summary, figures: Figures) -> str:

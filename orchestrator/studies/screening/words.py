@@ -16,6 +16,7 @@ from orchestrator.studies.operating_points.item import Status
 from orchestrator.studies.operating_points.line_ends import LineEnd
 from orchestrator.studies.operating_points.outages import Outage
 from orchestrator.studies.operating_points.points_file import OperatingCase
+from orchestrator.studies.operating_points.words import ONE_ITEM, all_items, counted_items
 from orchestrator.studies.screening.modes import UNSTABLE
 from orchestrator.studies.screening.record import ItemRecord
 from orchestrator.studies.screening.study import ScreenedItem, ScreeningPlan
@@ -161,13 +162,14 @@ def verdict_sentence(summary: Summary) -> str:
 
 
 def verdict_of(summary: Summary) -> VerdictSentence:
-    total = len(summary.result.items)
+    total, planned = len(summary.result.items), summary.result.plan.number_of_items
     if summary.unstable:
         growing = (one.item for one in summary.least_damped() if one.item.record.stable is False)
         worst = next(growing, summary.unstable[0])
         told = (not_judged(summary), runs_sentence(summary), summary.beyond)
         lost = "".join(f"; {text}" for text in told if text)
-        text = f"at {len(summary.unstable)} of {total} points and outages; worst: {where(worst)}{_least(worst)}{lost}"
+        at = f"at {counted_items(len(summary.unstable), total, planned)}; worst: {where(worst)}"
+        text = f"{at}{_least(worst)}{lost}"
         return VerdictSentence(False, "UNSTABLE", text)
     if summary.gone_wrong:
         text = f"in {len(summary.gone_wrong)} of {len(summary.runs)} runs of outages, though no mode grows"
@@ -185,9 +187,9 @@ def verdict_of(summary: Summary) -> VerdictSentence:
     ran = runs_sentence(summary)
     tail += "".join(f"; {text}" for text in (ran, summary.beyond) if text)
     if summary.stable:
-        text = f"nothing grows at any of {total} points and outages{_but_slowly(summary)}{tail}"
+        text = f"nothing grows at {all_items(total, 'any of')}{_but_slowly(summary)}{tail}"
         return VerdictSentence(True, "stable", text)
-    left = summary.result.plan.number_of_items - total
+    left = planned - total
     text = not_judged(summary)
     missing = [text] if text else []
     missing += [f"{left} not computed yet"] if left else []
@@ -204,10 +206,8 @@ def verdict_of(summary: Summary) -> VerdictSentence:
     missing += [f"{doubtful} stand at the edge of a limit"] if doubtful else []
     tripping = len(summary.tripping)
     missing += [f"what relays leave at {tripping} of them is not judged"] if tripping else []
-    text = (
-        f"nothing grows at {computed} of {total} points and outages, but {', '.join(missing)}{tail}"
-    )
-    return VerdictSentence(None, "not known", text)
+    known = f"nothing grows at {counted_items(computed, total, planned)}, but " if computed else ""
+    return VerdictSentence(None, "not known", f"{known}{', '.join(missing)}{tail}")
 
 
 def what_was_counted(summary: Summary) -> str:
@@ -223,12 +223,16 @@ def what_was_counted(summary: Summary) -> str:
         if summary.slowest
         else ""
     )
+    one = summary.result.plan.number_of_items == 1
+    counted = f"{summary.counted_items} of {computed}"
+    if one:
+        counted = "it as well" if summary.counted_items else "no point"
     return (
         f"Scenario {summary.result.plan.prepared.name}: modes from {wanted.lowest_hz:g} to {wanted.highest_hz:g} Hz "
-        f"below {100 * wanted.damping:g} % damping, of the "
-        f"{_what_was_linearised(summary)}: found anew at {searched} of {computed} points and outages"
+        f"below {100 * wanted.damping:g} % damping, of the {_what_was_linearised(summary)}: "
+        f"found anew at {ONE_ITEM if one else counted_items(searched, computed)}"
         f"{others}. Whether something grows at other frequencies was counted at "
-        f"{summary.counted_items} of {computed}{large}.{_outages_not_asked(summary)}"
+        f"{counted}{large}.{_outages_not_asked(summary)}"
     )
 
 

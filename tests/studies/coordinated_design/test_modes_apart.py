@@ -159,12 +159,12 @@ def test_what_is_asked_for_is_reached_and_the_other_mode_is_named():
     assert found.met is True
     assert said.startswith(
         "REACHED for the modes that these controllers move, NOT REACHED for others: now, intact: 1.312 Hz, 7.98 % "
-        "(sg1, sg3) is below 8 %; 8 % at all 1 points and outages; least damped of the "
+        "(sg1, sg3) is below 8 %; 8 % at the one operating point; least damped of the "
         "modes that these controllers move: now, intact: 0.961 Hz, 8.01 % (sg7); of all modes: now, "
         "intact: 1.312 Hz, 7.98 % (sg1, sg3); without the "
         "controllers: now, intact: 0.961 Hz, 2.91 % (sg7)"
     )
-    assert "apart, at 1 of 1" in said
+    assert "apart, at the one operating point" in said
     assert "1.312 Hz, 7.98 % (sg1, sg3)" in said
     assert verdict(before, after, aim).met is False
     grown = spectrum((0.961, 0.0801), (1.312, -0.001))
@@ -203,7 +203,7 @@ def test_beside_a_named_mode_the_least_of_all_is_told():
             "HELD WITHOUT THE CONTROLLERS ALREADY for the modes that these controllers move, NOT REACHED for "
             "others: now, intact: 1.312 Hz, 7.98 %",
         ),
-        (0.0799, 0.0980, "REACHED: 8 % at all"),
+        (0.0799, 0.0980, "REACHED: 8 % at the one operating point"),
     ],
 )
 def test_what_no_gain_was_needed_for_is_said_first(swing, local, words):

@@ -127,7 +127,7 @@ def test_units_beyond_their_rating_are_in_the_verdict_and_the_report():
     assert found.as_json()["beyond_rating"] == said
     assert of_screening(Path("screening.json"), found.as_json()).not_judged == [said]
     calm = replace(found.result, items=found.result.items[:1])
-    assert "rating" not in verdict_sentence(Summary(calm))
+    assert "beyond its rating" not in verdict_sentence(Summary(calm))
 
 
 def test_what_was_searched_in_the_range_alone_is_not_stable(screened):
