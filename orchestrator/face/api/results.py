@@ -17,7 +17,7 @@ from orchestrator.core.spelling import joined, spelled
 from orchestrator.core.truth import NoTruth
 from orchestrator.linear.signals.identification import IdentifiedMode
 from orchestrator.linear.spectra.modes import ZERO, Mode, eigenvalues
-from orchestrator.output.report.notebook import Axes, axes_or_new, curves_on, page
+from orchestrator.output.report.notebook import Axes, axes_or_new, curves_on, headline, page
 from orchestrator.output.results.staging import ScenarioFolder, new_run_id, staged
 from orchestrator.studies.oscillations.view import Sources, sources_of
 from orchestrator.studies.signals.comparison import recorded
@@ -255,7 +255,12 @@ class Modes(NoTruth, ask=".stability.stable, or len() for the number of modes in
             *outside,
             *(f"warning: {text}" for text in self.warnings),
         ]
-        return page(f"Modes of {r.prepared.case.name}: {r.prepared.title}", lines, self.table())
+        least = min(self, key=lambda mode: mode.damping_percent, default=None)
+        figures = f"{least.frequency_hz:.3f} Hz, {least.damping_percent:.2f} %" if least else ""
+        verdict = f"{self.stability.verdict}{', least damped ' if least else ''}{figures}"
+        title = f"Modes of {r.prepared.case.name}: {r.prepared.title}"
+        top = headline(verdict, self.stability.stable)
+        return page(title, lines, self.table(), verdict=top)
 
 
 class NoSuchIndexError(InputError, IndexError):

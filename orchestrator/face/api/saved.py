@@ -10,7 +10,9 @@ from typing import Any
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError
 from orchestrator.core.late import pd
-from orchestrator.output.report.notebook import page
+from orchestrator.output.report.html.chapters.chapter import Chapter
+from orchestrator.output.report.html.chapters.folders import chapters_in
+from orchestrator.output.report.notebook import headline, page
 from orchestrator.output.results.manifest import MANIFEST, checked
 from orchestrator.output.results.recorded import open_whole
 
@@ -64,10 +66,25 @@ class Saved(Mapping[str, Any]):
         return dict(json.loads(file.read_text(encoding="utf-8"))) if file.is_file() else {}
 
     def _repr_html_(self) -> str:
-        return page(str(self.folder), self)
+        """Return the answers of the studies in the folder, what made them, and the files."""
+        try:
+            told = [verdict for one in chapters_in(self.folder) for verdict in _verdicts(one)]
+        except InputError as error:
+            told = [(str(error), False)]
+        origin = self.provenance
+        made = (origin.get(name) for name in ("date", "command"))
+        lines = [text for text in (*made, ", ".join(self)) if text]
+        verdicts = "".join(headline(text, good) for text, good in told)
+        return page(str(self.folder), lines, verdict=verdicts)
 
     def __repr__(self) -> str:
         return f"<Saved {self.folder}: {', '.join(self)}>"
+
+
+def _verdicts(chapter: Chapter) -> list[tuple[str, bool | None]]:
+    """Return a study's answer and if it is good: one of each scenario where it judges several."""
+    lines = [(line.words, line.stable) for line in chapter.lines]
+    return lines or [(chapter.answer, chapter.good)]
 
 
 def open(folder: str | Path) -> Saved:

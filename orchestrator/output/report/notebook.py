@@ -48,15 +48,31 @@ def curves_on(axes: Axes) -> int:
     return len(axes.get_legend_handles_labels()[1])
 
 
+_COLOURS = {True: "#17803f", False: "#c62828", None: "inherit"}
+"""Of a verdict that is good, bad or not known, on a light ground and on a dark one."""
+
+
+def headline(text: str, good: bool | None) -> str:
+    """Return a verdict as HTML, in its colour."""
+    return f'<p style="font-size: 1.15em; color: {_COLOURS[good]}"><b>{escape(text)}</b></p>'
+
+
 def page(
-    title: str, lines: Iterable[str] = (), table: pd.DataFrame | None = None, rest: str = ""
+    title: str,
+    lines: Iterable[str] = (),
+    table: pd.DataFrame | None = None,
+    rest: str = "",
+    verdict: str = "",
 ) -> str:
-    """HTML of a result; of its table the first rows are shown, and ``rest`` is HTML already."""
-    parts = [f"<p><b>{escape(title)}</b></p>", *(f"<p>{escape(line)}</p>" for line in lines)]
+    """HTML of a result; of its table the first rows are shown.
+
+    ``verdict``, which stands on top, and ``rest``, which stands below, are HTML already."""
+    parts = [verdict, f"<p><b>{escape(title)}</b></p>"]
+    parts += [f"<p>{escape(line)}</p>" for line in lines]
     if table is not None:
         counted = isinstance(table.index, pd.RangeIndex) and table.index.name is None
         figures = "{:.5g}".format
         parts.append(
             table.to_html(max_rows=_ROWS, na_rep="", float_format=figures, index=not counted)
         )
-    return "\n".join([*parts, rest])
+    return "\n".join(filter(None, [*parts, rest]))

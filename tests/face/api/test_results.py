@@ -368,10 +368,14 @@ def test_results_show_themselves(modes, run, two_area):
     scenario = two_area.scenario("gfor")
     for shown in (two_area, scenario, modes, run):
         html = shown._repr_html_()
-        assert html.startswith("<p><b>")
+        assert html.startswith("<p")
         assert "two_area" in html or "infinite_bus" in html
         assert repr(shown).startswith("<")
-    assert "stable: the largest real part" in modes._repr_html_()
+    html = modes._repr_html_()
+    assert "stable: the largest real part" in html
+    least = min(modes, key=lambda mode: mode.damping_percent)
+    figures = f"{least.frequency_hz:.3f} Hz, {least.damping_percent:.2f} %"
+    assert f"<b>stable, least damped {figures}</b>" in html[: html.index("Modes of")]
     assert "electromechanical" in modes._repr_html_()
     linear = scenario.linearize()
     assert f"<th>{linear.outputs[0]}</th>" in linear._repr_html_()  # D by name, not all of A
