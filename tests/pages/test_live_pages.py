@@ -6,12 +6,15 @@ import re
 import pytest
 
 import orchestrator as gfor
+from tests.output.report.test_html import CHROMIUM, OPTIONS
 from tests.pages.markdown import ROOT, links
 
 GUIDE = ROOT / ".docs" / "how-to" / "look-first.md"
 PAGES = sorted((ROOT / ".docs" / "live").glob("*.html"))
 LARGEST = 3_000_000
 """Bytes of a page: a slow line fetches it in ten seconds."""
+MOST_STOPS = 20
+"""Stops of the Tab key from the top of a page within which its questions are."""
 
 
 def saved(path):
@@ -49,3 +52,27 @@ def test_the_figures_are_those_of_today(name):
         assert [mode["damping_percent"] for mode in found["modes"]] == pytest.approx(
             [mode.damping_percent for mode in modes], abs=1e-3
         )
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
+def test_every_question_of_a_page_is_asked_by_tab_and_enter():
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as tools:
+        browser = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        view = browser.new_page(viewport={"width": 1280, "height": 900})
+        view.goto((ROOT / ".docs" / "live" / "two_area.html").as_uri())
+        view.get_by_role("button", name="What is a mode?").wait_for()
+        asked = set()
+        for _ in range(MOST_STOPS):
+            view.keyboard.press("Tab")
+            question = view.evaluate("document.activeElement.textContent").strip()
+            if question.endswith("?") and question not in asked:
+                before = view.inner_text("body")
+                view.keyboard.press("Enter")
+                view.wait_for_function("seen => document.body.innerText !== seen", arg=before)
+                asked.add(question)
+        answer = view.inner_text("body")
+        browser.close()
+    assert "What is a mode?" in asked
+    assert len(asked) >= 3
+    assert "A mode is one of the ways in which the system swings" in answer
