@@ -91,10 +91,10 @@ _TAG = re.compile(r"(<[^>]*>)")
 
 def with_units_held(findings: str) -> str:
     """Return what stands on top of a page, with every figure beside its unit in verdicts and remarks."""
-    return _HEADLINE.sub(_held, findings)
+    return _HEADLINE.sub(_hold_units, findings)
 
 
-def _held(found: re.Match[str]) -> str:
+def _hold_units(found: re.Match[str]) -> str:
     parts = _TAG.split(found[0])
     parts[::2] = [_UNIT.sub("\N{NO-BREAK SPACE}", text) for text in parts[::2]]
     return "".join(parts)
