@@ -20,7 +20,7 @@ from urllib.parse import urlsplit
 from fmus.toolchain.extras import require
 from orchestrator.core.errors import CosimError, ErrorKind, InputError
 from orchestrator.core.options import Option
-from orchestrator.studies.points.executor import ATTEMPTS, Result, Task, WorkerLostError
+from orchestrator.studies.points.lost_workers import ATTEMPTS, Result, Task, WorkerLostError
 
 INTERVAL = 5.0  # seconds between two looks at the workers
 

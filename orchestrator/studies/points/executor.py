@@ -1,18 +1,9 @@
 """Base of all executors, and the one that computes one task after another, in this process."""
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Protocol, TypeVar
+from typing import Protocol
 
-from orchestrator.core.errors import CosimError
-
-Task = TypeVar("Task")
-Result = TypeVar("Result")
-
-ATTEMPTS = 3  # A task that has lost its worker this many times is given up
-
-
-class WorkerLostError(CosimError):
-    """The process that computed a task died every time."""
+from orchestrator.studies.points.lost_workers import Result, Task, WorkerLostError
 
 
 class Executor(Protocol):
@@ -22,7 +13,7 @@ class Executor(Protocol):
         """Yield the index and the result of each task as soon as the result is there, in any order.
 
         An exception that ``function`` raises ends the run. A worker process that dies does not: its task is
-        computed again, up to `ATTEMPTS` times, and then yields a `WorkerLostError`."""
+        computed again, up to `lost_workers.ATTEMPTS` times, and then yields a `WorkerLostError`."""
         ...
 
     def close(self) -> None:

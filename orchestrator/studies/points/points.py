@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
-from orchestrator.studies.points.executor import Executor, WorkerLostError
+from orchestrator.studies.points.executor import Executor
 from orchestrator.studies.points.failure import Failure
+from orchestrator.studies.points.lost_workers import WorkerLostError
 from orchestrator.studies.points.store import POINTS, PointStore
 from orchestrator.studies.points.task import Task
 

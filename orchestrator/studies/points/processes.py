@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from functools import cache
+from functools import cache, partial
 from multiprocessing import forkserver
 from multiprocessing.context import BaseContext
 from pathlib import Path
@@ -19,9 +19,14 @@ from types import FrameType
 from typing import Any
 
 from fmus.toolchain.temporary import leave, own_folder, remove
-from orchestrator.core.options import Option
 from orchestrator.devices.fmi.interrupts import calls
-from orchestrator.studies.points.executor import ATTEMPTS, Result, Task, WorkerLostError
+from orchestrator.studies.points.executor import Result, Task
+from orchestrator.studies.points.lost_workers import (
+    ENDED,
+    WorkerLeftError,
+    WorkerLostError,
+    try_again,
+)
 from orchestrator.studies.points.main_guard import require_main_guard
 from orchestrator.studies.points.parts_done import join, tally
 
@@ -58,7 +63,8 @@ class Processes:
             # A dead worker takes the whole pool along and does not say which task it had. Those that were under
             # way are computed one at a time, so that only a task that really kills its worker is blamed for it.
             for index in suspects:
-                yield index, self._run_alone(function, tasks[index])
+                alone = partial(self._new_pool, 1)
+                yield index, try_again(alone, partial(_computed, function), tasks[index])
 
     def _run_together(
         self, function: Callable[[Task], Result], tasks: Sequence[Task], waiting: deque[int]
@@ -83,7 +89,7 @@ class Processes:
                 done, _ = wait(under_way, return_when=FIRST_COMPLETED)
                 for future in done:
                     index = under_way.pop(future)
-                    if isinstance(future.exception(), _ENDED):
+                    if isinstance(future.exception(), ENDED):
                         suspects.append(index)
                     else:
                         yield index, future.result()
@@ -112,22 +118,6 @@ class Processes:
             if self._at_work:
                 _end_workers(pool)
             pool.shutdown(wait=True, cancel_futures=True)
-
-    def _run_alone(
-        self, function: Callable[[Task], Result], task: Task
-    ) -> Result | WorkerLostError:
-        for _ in range(ATTEMPTS - 1):
-            pool = self._new_pool(1)
-            try:
-                return pool.submit(_computed, function, task).result()
-            except _ENDED:
-                continue
-            finally:
-                pool.shutdown(wait=True, cancel_futures=True)
-        return WorkerLostError(
-            f"its worker process died {ATTEMPTS} times; is there too little memory? Try "
-            "fewer " + Option.WORKERS + ", or this point alone with `gfor modes`"
-        )
 
 
 def _context(imports: Sequence[str]) -> BaseContext:
@@ -168,14 +158,6 @@ def _sockets_in_an_own_folder() -> None:
     leave(folder)  # whichever of the two modules was imported first
     # it removes its own at -100
     multiprocessing.util.Finalize(None, remove, args=(folder,), exitpriority=-101)
-
-
-class WorkerLeftError(Exception):
-    """A worker was told to leave what it was at; it takes nothing more."""
-
-
-# what a future says whose worker is gone, or was told to go
-_ENDED = (BrokenProcessPool, WorkerLeftError, SystemExit)
 
 
 class _Work:

@@ -10,7 +10,8 @@ import pytest
 from fmus.toolchain.extras import MissingLibraryError
 from orchestrator.core.errors import CosimError, ErrorKind, InputError
 from orchestrator.studies.points.dask_cluster import TLS_FILES, DaskCluster
-from orchestrator.studies.points.executor import Serial, WorkerLostError
+from orchestrator.studies.points.executor import Serial
+from orchestrator.studies.points.lost_workers import WorkerLostError
 from orchestrator.studies.points.processes import Processes
 from orchestrator.studies.points.study import choose_executor
 from tests.studies.points.small_tasks import (
