@@ -48,7 +48,7 @@ FLOORS = {
         ("case",),
         ("built_in", "forcing", "new", "use"),
     ),
-    "simulation": (("engine",), ("federation", "interop", "watch")),
+    "simulation": (("waiting_times",), ("engine",), ("federation", "interop", "watch")),
     "output": (("results", "signatures"), ("report",)),
     "studies": (
         ("points", "signals"),

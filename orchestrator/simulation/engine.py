@@ -10,12 +10,11 @@ from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
 from orchestrator.devices.fmi.component import Component
+from orchestrator.simulation.waiting_times import PATIENCE, TO_JOIN
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.observers import Observer
 from orchestrator.systems.coupling.system import ComponentPlan
 
-PATIENCE = 30.0  # how long a federate may take for one step, or one answer [s]
-TO_JOIN = 60.0  # how long is waited for all federates to join [s]
 DEFAULT_PORT = 23405  # of a HELICS broker whose address names none
 
 

@@ -7,9 +7,9 @@ import sys
 from orchestrator.core.errors import CosimError, InputError
 from orchestrator.face.cli.arguments import add_options
 from orchestrator.face.cli.case_arguments import add_case_arguments, prepare
-from orchestrator.simulation.engine import TO_JOIN
 from orchestrator.simulation.federation.federate import OwnFederate
 from orchestrator.simulation.federation.layout import require_broker
+from orchestrator.simulation.waiting_times import TO_JOIN
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -40,13 +40,11 @@ from orchestrator.simulation.federation.layout import (
     require_broker,
 )
 from orchestrator.simulation.federation.pace import Pace
+from orchestrator.simulation.waiting_times import AFTER_CTRL_C, HUB_GRACE, TO_END
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.system import ComponentPlan, System
 
 _LOOK = 0.2  # between two looks at the processes while something is waited for [s]
-_GRACE = 10.0  # what the hub gets beyond its own patience [s]
-_TO_END = 10.0  # for a process to end by itself [s]
-_AFTER_CTRL_C = 2.0  # how long Ctrl-C waits for the end of a step [s]
 
 
 class Federation(Closing):
@@ -190,7 +188,7 @@ class Federation(Closing):
             except TimeoutError:
                 self._look_patiently(deadline)
                 asked = asked or (time.monotonic() if interrupted.value else None)
-                if asked is not None and time.monotonic() > asked + _AFTER_CTRL_C:
+                if asked is not None and time.monotonic() > asked + AFTER_CTRL_C:
                     raise KeyboardInterrupt from None
                 continue
             except EOFError:
@@ -238,7 +236,7 @@ class Federation(Closing):
         self._asked += 1
         text = json.dumps({"number": self._asked, "command": command, "arguments": arguments})
         self._hub.send(frames.COMMAND, json.dumps({"component": name, "text": text}).encode())
-        reply = json.loads(self._receive(frames.COMMAND, self._choice.patience + _GRACE))
+        reply = json.loads(self._receive(frames.COMMAND, self._choice.patience + HUB_GRACE))
         if "error" in reply:
             raise ComponentError(name, f"the command {command!r}", "an error", reply["error"])
         return reply["result"]
@@ -264,7 +262,7 @@ class Federation(Closing):
 
     def _finish_step(self) -> None:
         slot = self._under_way
-        content = self._receive(frames.STEP, self._choice.patience + _GRACE)
+        content = self._receive(frames.STEP, self._choice.patience + HUB_GRACE)
         self._under_way = None
         numbers, begin = struct.unpack(f"<{len(content) // 8}d", content), 0
         for part in self.layout.parts:
@@ -275,7 +273,7 @@ class Federation(Closing):
     def _join(self) -> None:
         assert self._hub is not None
         self._hub.send(frames.JOIN)
-        joined = json.loads(self._receive(frames.JOIN, 2 * self._choice.to_join + _GRACE))
+        joined = json.loads(self._receive(frames.JOIN, 2 * self._choice.to_join + HUB_GRACE))
         for name, found in joined.items():
             self._published[name] = found["outputs"]
             if found["ours"]:
@@ -284,7 +282,7 @@ class Federation(Closing):
                 self._foreign.add(name)
         self._refuse_events()
         self._hub.send(frames.FIRST, json.dumps(sorted(self._foreign)).encode())
-        self._values |= json.loads(self._receive(frames.FIRST, self._choice.patience + _GRACE))
+        self._values |= json.loads(self._receive(frames.FIRST, self._choice.patience + HUB_GRACE))
         if self._foreign:
             self.prepared = self._with_foreign_federates()
 
@@ -371,7 +369,7 @@ class Federation(Closing):
         if hub is not None:
             with suppress(OSError):
                 hub.send(frames.END)
-        deadline = time.monotonic() + _TO_END
+        deadline = time.monotonic() + TO_END
         if hub is None or self._under_way is not None:  # it is busy, and hears nothing
             deadline = time.monotonic()
         for process in reversed(
@@ -384,7 +382,7 @@ class Federation(Closing):
                 process.stdin.close()
         for process in self._processes.values():
             with suppress(subprocess.TimeoutExpired):
-                process.wait(max(0.0, deadline + _TO_END - time.monotonic()))
+                process.wait(max(0.0, deadline + TO_END - time.monotonic()))
             if process.poll() is None:
                 process.kill()
             process.wait()
