@@ -67,6 +67,7 @@ _CASES = {
 """Room of the cases → the modules that stood beside it; ``former=present`` where the name changed as well."""
 
 _RENAMED = {
+    "systems.coupling.wires": "systems.coupling.imperfect_wires",
     "output.report.table": "output.report.column_table",
     "output.report.tables": "output.report.terminal_tables",
 }

@@ -271,6 +271,7 @@ FOR_TYPES = {
     "cases.form.given",
     "cases.form.names",
     "cases.form.values",
+    "systems.coupling.connections",
     "systems.coupling.system",
     "face.cli.terminal",
     "systems.coupling.observers",

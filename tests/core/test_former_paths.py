@@ -26,6 +26,7 @@ FORMER = {
     "orchestrator.cases.network_data": "orchestrator.cases.networks.data",
     "orchestrator.cases.psse.raw": "orchestrator.cases.networks.psse.raw",
     "orchestrator.output.report.table": "orchestrator.output.report.column_table",
+    "orchestrator.coupling.wires": "orchestrator.systems.coupling.imperfect_wires",
     "orchestrator.report.table": "orchestrator.output.report.column_table",
 }
 

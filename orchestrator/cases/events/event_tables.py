@@ -21,8 +21,9 @@ from orchestrator.core.errors import InputError, Problem, QuestionTopic
 from orchestrator.core.options import Option
 from orchestrator.systems.coupling import events as coupled
 from orchestrator.systems.coupling.clock import Clock
+from orchestrator.systems.coupling.connections import Endpoint
 from orchestrator.systems.coupling.events import Event
-from orchestrator.systems.coupling.system import ComponentPlan, Endpoint
+from orchestrator.systems.coupling.system import ComponentPlan
 
 _POWERS = ("P_ref", "Pref")
 # product of the frequency of a forcing and the communication step up to which it is followed

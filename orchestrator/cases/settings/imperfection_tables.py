@@ -16,6 +16,7 @@ from orchestrator.core.options import Option
 from orchestrator.core.toml_files import fault_of
 from orchestrator.devices.fmi.description import VariableInfo
 from orchestrator.systems.coupling.clock import Clock
+from orchestrator.systems.coupling.connections import Connection
 from orchestrator.systems.coupling.imperfections import (
     Bias,
     Delay,
@@ -24,7 +25,7 @@ from orchestrator.systems.coupling.imperfections import (
     Noise,
     Quantisation,
 )
-from orchestrator.systems.coupling.system import Connection, System
+from orchestrator.systems.coupling.system import System
 from orchestrator.systems.coupling.wire_bank import whole_steps
 
 KEY = "imperfections"

@@ -18,10 +18,10 @@ from orchestrator.linear.models.held_inputs import LineMap, over_parts
 from orchestrator.linear.models.linear_model import Indices
 from orchestrator.linear.models.remembered import remembered
 from orchestrator.linear.models.sampled import repeating, steps_of_period
+from orchestrator.systems.coupling.connections import Endpoint
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.schedule import Schedule
 from orchestrator.systems.coupling.step_awareness import knows_step, other_step
-from orchestrator.systems.coupling.system import Endpoint
 
 MANY_INPUTS = 1_000
 """Of a component with so many inputs those that nothing moves are not perturbed: the devices' admittances, half of the

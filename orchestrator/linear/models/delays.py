@@ -13,9 +13,9 @@ from orchestrator.core.arrays import Matrix, Vector
 from orchestrator.core.options import Option
 from orchestrator.linear.models.held_inputs import over_held_inputs
 from orchestrator.linear.models.linear_model import DELAYED
+from orchestrator.systems.coupling.connections import Endpoint
 from orchestrator.systems.coupling.imperfections import DropOut, Noise, Quantisation
 from orchestrator.systems.coupling.master import Master
-from orchestrator.systems.coupling.system import Endpoint
 
 ORDER = 24
 """Polynomials of a long delay. In a continuous model the delay is right to 1e-9 of its value where ω·T is below 24 rad,

@@ -20,9 +20,10 @@ from typing import Any
 
 from fmus.toolchain.temporary import leave, own_folder, remove
 from orchestrator.devices.fmi.interrupts import calls
-from orchestrator.studies.points.executor import Result, Task
 from orchestrator.studies.points.lost_workers import (
     ENDED,
+    Result,
+    Task,
     WorkerLeftError,
     WorkerLostError,
     try_again,

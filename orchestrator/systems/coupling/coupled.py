@@ -18,10 +18,11 @@ from orchestrator.devices.fmi.component import Component, RealBatch
 from orchestrator.devices.fmi.instance import open_component
 from orchestrator.systems.coupling.clock import Clock
 from orchestrator.systems.coupling.compiled_loop import apart
+from orchestrator.systems.coupling.connections import Endpoint
+from orchestrator.systems.coupling.imperfect_wires import Wires
 from orchestrator.systems.coupling.schedule import Schedule
-from orchestrator.systems.coupling.system import ComponentPlan, Endpoint, System
+from orchestrator.systems.coupling.system import ComponentPlan, System
 from orchestrator.systems.coupling.turns import Exchange
-from orchestrator.systems.coupling.wires import Wires
 
 _INITIAL_PASSES = 20
 # of 1 or of an output: by how much it may change as initialisation ends, with the inputs as they

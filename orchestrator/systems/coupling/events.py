@@ -9,8 +9,8 @@ from math import isfinite, pi, sin
 from typing import Literal
 
 from fmus.grid.names import line_variable
+from orchestrator.systems.coupling.connections import Connection
 from orchestrator.systems.coupling.imperfections import Imperfection
-from orchestrator.systems.coupling.system import Connection
 
 SMALLEST_FAULT_REACTANCE = 1e-5
 """X [pu, 100 MVA] of a fault without impedance: what is left of the voltage is 1e-5 pu for each pu of its current."""

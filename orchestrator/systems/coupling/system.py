@@ -8,43 +8,21 @@ from typing import TYPE_CHECKING
 
 from orchestrator.core.errors import InputError
 from orchestrator.devices.fmi.values import Scalar
+from orchestrator.systems.coupling.connections import (
+    Connection,
+    Endpoint,
+    check_direction,
+    check_type,
+    check_unit,
+)
 from orchestrator.systems.coupling.imperfections import Imperfection, WirePlan
 
 if TYPE_CHECKING:
     from orchestrator.devices.fmi.description import FmuDescription, VariableInfo
 
 
-_CARRIED = {
-    ("Real", "Real"),
-    ("Integer", "Integer"),
-    ("Boolean", "Boolean"),
-    ("Enumeration", "Enumeration"),
-    ("Integer", "Real"),  # every whole number is a real one
-}
-"""Types of an output and of the input that it may feed. SSP leaves connections between types to the importer; those
-that could lose a part of the value are none here.
-"""
-
 # types of inputs that nobody can feed or give a value here
 _KEPT = ("String", "Binary")
-
-
-@dataclass(frozen=True, slots=True)
-class Endpoint:
-    component: str
-    variable: str
-
-    def __str__(self) -> str:
-        return f"{self.component}.{self.variable}"
-
-
-@dataclass(frozen=True, slots=True)
-class Connection:
-    source: Endpoint
-    target: Endpoint
-
-    def __str__(self) -> str:
-        return f"{self.source} -> {self.target}"
 
 
 @dataclass
@@ -135,27 +113,12 @@ class System:
         label = f"connection {source} → {target}"
         start, out = self._resolve(source, label)
         end, into = self._resolve(target, label)
-        if out.causality != "output":
-            raise InputError(
-                f"{label}: {source} is of causality {out.causality}; a connection starts at an output"
-            )
-        if into.causality != "input":
-            raise InputError(
-                f"{label}: {target} is of causality {into.causality}; a connection ends at an input"
-            )
+        connection = Connection(start, end)
+        check_direction(connection, out, into)
         kinds = self._declared_type(start), self._declared_type(end)
-        if kinds not in _CARRIED:
-            raise InputError(
-                f"{label}: {source} is {kinds[0]} and {target} is {kinds[1]}; a connection carries Real, Integer, "
-                "Boolean and Enumeration to the same type, and Integer to Real: correct the wrong end, or let a "
-                "component convert"
-            )
-        as_it_is = ignore_units or converted is not None
-        if out.unit and into.unit and out.unit != into.unit and not as_it_is:
-            raise InputError(
-                f"{label}: {source} is in {out.unit} and {target} in {into.unit}; units must be equal, since "
-                "none is converted on the way: correct the wrong one, or let a component convert"
-            )
+        check_type(connection, kinds)
+        if not ignore_units and converted is None:
+            check_unit(connection, out, into)
         feeding = self._sources().get(end)
         if feeding is not None:
             raise InputError(
@@ -166,7 +129,7 @@ class System:
         factor, offset = converted or (1.0, 0.0)
         if kinds[1] != "Real" or (factor, offset) != (1.0, 0.0):
             self._carry(end, factor, offset, out.unit)
-        self.connections.append(Connection(start, end))
+        self.connections.append(connection)
         self._feeding[end] = start
 
     def _declared_type(self, end: Endpoint) -> str:

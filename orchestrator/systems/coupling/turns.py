@@ -17,7 +17,7 @@ class Exchange:
     y.
     ``sources``: For each input the index in y of the output that feeds it.
     ``delivered``: The index of what arrives at each input: the same, or behind the outputs the place of what a
-    connection makes of it (`orchestrator.systems.coupling.wires`)."""
+    connection makes of it (`orchestrator.systems.coupling.imperfect_wires`)."""
 
     def __init__(
         self,

@@ -62,7 +62,7 @@ class _Bank(ctypes.Structure):
 @cache
 def _library() -> Any | None:
     try:
-        library = ctypes.PyDLL(str(compile_here(Path(__file__).with_name("wires.c"))))
+        library = ctypes.PyDLL(str(compile_here(Path(__file__).with_name("imperfect_wires.c"))))
     except (OSError, RuntimeError):
         return None
     for function in (library.wires_set_real, library.wires_get_real):

@@ -8,8 +8,9 @@ from xml.etree.ElementTree import Element, SubElement
 
 from orchestrator.core.errors import InputError
 from orchestrator.devices.fmi.converted import native
+from orchestrator.systems.coupling.connections import Connection
 from orchestrator.systems.coupling.imperfections import described
-from orchestrator.systems.coupling.system import ComponentPlan, Connection, System
+from orchestrator.systems.coupling.system import ComponentPlan, System
 from orchestrator.systems.ssp.names import (
     FMU_TYPE,
     PARAMETER_SET_TYPE,

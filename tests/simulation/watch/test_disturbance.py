@@ -8,9 +8,9 @@ from orchestrator.simulation.watch.undisturbed import disturbances
 from orchestrator.simulation.watch.watch import judge_run
 from orchestrator.studies.runs.files import summary_of
 from orchestrator.studies.runs.run import run_scenario
+from orchestrator.systems.coupling.connections import Connection, Endpoint
 from orchestrator.systems.coupling.events import WireFault, WireRecovery
 from orchestrator.systems.coupling.imperfections import Noise, Quantisation
-from orchestrator.systems.coupling.system import Connection, Endpoint
 from tests.simulation.watch.seen import seen_of, system
 from tests.support.scenarios import prepare_one
 

@@ -119,7 +119,7 @@ def test_the_same_files_give_the_same_name(named):
         ),
         (
             SWEEP,
-            "systems/coupling/wires.c",
+            "systems/coupling/imperfect_wires.c",
             "#include <math.h>",
             "#include <math.h>\n#define HALF 0.5",
         ),

@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.core.errors import InputError
+from orchestrator.systems.coupling.connections import Endpoint
 from orchestrator.systems.coupling.imperfections import Imperfection
 from orchestrator.systems.coupling.schedule import Schedule
-from orchestrator.systems.coupling.system import Endpoint, System
+from orchestrator.systems.coupling.system import System
 from orchestrator.systems.coupling.wire_bank import STRETCH, WireBank
 
 
