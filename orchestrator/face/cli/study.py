@@ -1,7 +1,7 @@
 """A study of many points as a command: options, the folder, what is printed, and the last line."""
 
 import argparse
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -29,7 +29,6 @@ from orchestrator.face.cli.terminal import (
 from orchestrator.face.cli.verdict import add_verdict_argument
 from orchestrator.output.report.progress import progress_bar
 from orchestrator.output.results.lock import hold_folder
-from orchestrator.output.results.manifest import made_now
 from orchestrator.studies.points.executor import Executor
 from orchestrator.studies.points.parts_done import counting
 from orchestrator.studies.points.points import CountReport
@@ -181,7 +180,7 @@ def print_study(
 
 def present(
     options: argparse.Namespace,
-    as_json: Callable[[], Mapping[str, Any]],
+    as_json: Callable[[], object],
     parts: Iterable[RenderableType],
     remarks: Iterable[str] = (),
     end: str = "",
@@ -193,7 +192,7 @@ def present(
     names = prepared[0].names if prepared else None
     console = make_console(stderr=options.json, names=names)
     if options.json:
-        print_json({**as_json(), "made": made_now()})
+        print_json(as_json())
     else:
         print_parts(console, parts)
     for text in remarks:

@@ -161,6 +161,9 @@ def test_a_design_is_that_of_the_command(gfor, tmp_path, two_area):
     design = two_area.design("pod_p", margins=False)
     printed = json.loads(out)
     assert printed.pop("parameter_file") == str(file)
+    made = printed.pop("made")
+    assert made["command"].startswith("gfor design two_area --controller pod_p")
+    assert made["code"]
     assert printed == json.loads(json.dumps(design.as_json()))
     saved = design.save(tmp_path / "saved.toml")
     beside = json.loads(saved.with_suffix(".json").read_text(encoding="utf-8"))

@@ -215,9 +215,9 @@ def test_what_ended_the_search_is_said(five, monkeypatch):
     (one,) = found.confirmations
     tuned = replace(one, setting=PodSetting(100.0, NO_COMPENSATION))
     for search, words in (
-        (SearchEnd(100.0), "(K 100, the largest that --gain allows)"),
-        (SearchEnd(200.0, 200.0, 0.0711), "(K 100; with 200 the least damped mode has 7.11 %)"),
-        (SearchEnd(200.0, 200.0), "(K 100; with 200 something grows)"),
+        (SearchEnd(100.0), "(K 100 pu, the largest that --gain allows)"),
+        (SearchEnd(200.0, 200.0, 0.0711), "(K 100 pu; with 200 the least damped mode has 7.11 %)"),
+        (SearchEnd(200.0, 200.0), "(K 100 pu; with 200 something grows)"),
     ):
         ended = replace(found, confirmations=(replace(tuned, search=search),))
         assert words in " ".join(sureness(ended))
