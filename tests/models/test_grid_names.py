@@ -27,3 +27,25 @@ def test_the_grid_has_the_names_that_a_line_gives_its_variables():
 )
 def test_data_of_a_line_begin_with_the_quantity_and_all_else_with_the_line(quantity, name):
     assert line_variable("tie", quantity) == name
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        ("soutth", "; did you mean 'south'?"),
+        ("NORTH", "; did you mean 'north'?"),
+        ("line-7", "; did you mean 'bus_7'?"),
+        ("elsewhere", ""),
+    ],
+)
+def test_a_bus_that_does_not_exist_is_told_with_those_of_nearly_its_name(written, meant):
+    with pytest.raises(ValueError, match="does not exist") as error:
+        Network(
+            "misspelt",
+            ("north", "south", "bus_7"),
+            (Line("tie", "north", "south", X=0.1), Line("far", "south", "bus_7", X=0.1)),
+            (Load("city", written, 10.0),),
+            (),
+        )
+    told = f"load 'city' is at bus {written!r}, which does not exist{meant}"
+    assert told in str(error.value)

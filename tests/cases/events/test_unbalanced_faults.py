@@ -14,7 +14,7 @@ import orchestrator as gfor
 from fmus.grid.network import OPEN_CHARGING
 from orchestrator.cases.case import load_case
 from orchestrator.cases.forcing import event_of, with_events
-from orchestrator.core.errors import CaseError, InputError
+from orchestrator.core.errors import CaseError, InputError, QuestionTopic
 from orchestrator.core.options import Option
 from orchestrator.systems.coupling.events import (
     LineEndSwitching,
@@ -298,6 +298,16 @@ def test_a_fault_along_a_transformer_is_refused_and_the_remedy_works(case, name,
         "BusFault",
         "LineSwitching",
     ]
+
+
+def test_data_that_are_assumed_are_asked_about_at_the_event_with_what_states_them(tmp_path):
+    fault = '[[events]]\ntype = "bus_fault"\ntime = "0.1 s"\nbus = "b3"\nkind = "1-phase"\n'
+    ready = prepared(tmp_path, fault, RADIAL.replace("line_z0 = 3.0\n", ""))
+    topic = QuestionTopic("sequence data: line_z0")
+    (asked,) = (one for one in ready.questions if one.topic == topic)
+    assert asked.place.endswith("events.0")
+    assert "1 element: l23" in asked.text
+    assert "line_z0 = " in asked.text
 
 
 def test_a_fault_along_what_is_taken_for_a_transformer_is_asked_about(tmp_path):

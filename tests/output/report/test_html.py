@@ -166,6 +166,19 @@ def test_a_frame_without_extent_still_has_axes():
     assert Frame((0, 2), (0, 1), "", "").at(1, 0)[0] > 0
 
 
+def test_a_curve_far_from_zero_fills_its_frame():
+    """A frequency that moves by 20 mHz at 50 Hz: the margins are parts of what moves, and not of its value."""
+    x, y = np.linspace(0, 1, 50), np.linspace(49.99, 50.01, 50)
+    chart = line_chart("frequency", "s", "Hz", [ChartCurve("f", "#000", x, y)])
+    (points,) = re.findall(r'<polyline points="([^"]*)"', chart)
+    heights = [float(pair.split(",")[1]) for pair in points.split()]
+    top, bottom = (
+        float(re.search(rf'data-{edge}="(\S+)"', chart)[1]) for edge in ("top", "bottom")
+    )
+    assert top < min(heights) < top + 0.1 * (bottom - top)
+    assert bottom - 0.1 * (bottom - top) < max(heights) < bottom
+
+
 def test_the_fastest_eigenvalue_stands_in_the_picture():
     """Right of the axis, from which the picture begins; and the right half plane is seen as well."""
     text = complex_plane("plane", [Mark(x, 2.0, "red", "a mode", "circle") for x in (-10.0, 0.0)])

@@ -90,6 +90,20 @@ def test_without_a_switch_it_is_not_known():
     assert "no switch turns it off" in v.unknown
 
 
+@pytest.mark.parametrize(
+    ("failure", "off_failure", "why"),
+    [
+        (None, "", "it has no modes"),
+        ("the FMU crashed", "", "the FMU crashed"),
+        ("the FMU crashed", "no licence", "no licence"),
+    ],
+)
+def test_a_point_without_modes_says_why_it_is_not_known(failure, off_failure, why):
+    (v,) = judged(replace(point(), modes=None, failure=failure, off_failure=off_failure))
+    assert not v.is_judged
+    assert v.unknown == f"what POD-P changes is not known: {why}"
+
+
 @pytest.mark.parametrize("named", [True, False])
 def test_a_certificate_keeps_what_it_is_judged_by(named):
     made = point(named=named)

@@ -1,5 +1,7 @@
 """What a component's variables are before anything runs."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from orchestrator.core.errors import InputError
@@ -31,3 +33,21 @@ def test_an_output_without_a_start_value_has_none_and_counts_as_zero():
 def test_an_unknown_name_is_no_value():
     with pytest.raises(InputError, match="KK"):
         ComponentPlan(small_fmu("gain")).value("KK")
+
+
+def test_only_what_takes_a_voltage_and_gives_a_current_stands_at_a_bus():
+    """A meter takes a voltage as well, and a measured current is given without one: neither is a converter."""
+    voltage, current = ("v_re", "v_im"), ("i_re", "i_im")
+
+    def plan(inputs, outputs):
+        return ComponentPlan(SimpleNamespace(kind="", inputs=inputs, outputs=outputs))
+
+    device, meter, recorded = (
+        plan(inputs, outputs)
+        for inputs, outputs in ((voltage, current), (voltage, ("size",)), (("u",), current))
+    )
+    assert [(each.has_port, each.kind) for each in (device, meter, recorded)] == [
+        (True, "converter"),
+        (False, ""),
+        (False, ""),
+    ]

@@ -8,6 +8,7 @@ from scipy.linalg import expm
 
 from orchestrator.studies.certification.codes.bench_resonance import (
     PARTS,
+    WINDOW,
     Ring,
     of_the_bench,
     ring_of,
@@ -142,3 +143,10 @@ def test_a_span_without_a_window_of_points_has_no_ring():
     few = np.arange(0, 0.02, 1e-4)
     assert ring_of(few, np.ones(len(few), complex), np.ones(len(few), complex), 50.0) is None
     assert ring_of(few[:1], few[:1] + 0j, few[:1] + 0j, 50.0) is None
+
+
+def test_a_span_of_one_window_has_its_ring():
+    times = np.arange(0, WINDOW - 5e-5, 1e-4)
+    v = 1 + 0.1 * np.exp(2j * np.pi * 650.0 * times)
+    ring = ring_of(times, v, np.zeros(len(times), complex), 50.0)
+    assert ring.frequency == pytest.approx(700.0, abs=2.0)

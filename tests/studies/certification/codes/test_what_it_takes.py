@@ -1,6 +1,7 @@
 """What failed criteria would take, on a converter whose answers are known."""
 
 import json
+from types import SimpleNamespace
 
 import pytest
 
@@ -15,6 +16,7 @@ from orchestrator.studies.certification.codes.needs_record import (
     remarks_of,
     save_needs,
 )
+from orchestrator.studies.certification.codes.sensitivity import MarginSensitivity
 from orchestrator.studies.certification.request import CertificationRequest
 from orchestrator.studies.points.executor import Serial
 
@@ -67,6 +69,30 @@ def test_the_inertia_that_is_missing_lies_in_the_droop_and_its_lag(converter, tm
     assert written["failed"][0]["sensitivities"][0]["margin_per_relative_change"] == first.slope
     assert written["failed"][0]["confirmed"]["margin"] == confirmed.margin
     assert written["left_out"]["pod_p.enabled"] == "of type Boolean"
+
+
+def test_the_parameter_that_reaches_the_limit_is_tried_before_one_that_only_comes_nearer(
+    monkeypatch,
+):
+    """The straight line's figure stands beside what the run had: both of the margin that failed."""
+    far, near = (
+        MarginSensitivity(
+            SimpleNamespace(value=2.0, scale=2.0, allows=lambda _: True), -0.4, slope=s
+        )
+        for s in (0.5, 1.0)
+    )
+    again = SimpleNamespace(criterion="inertia", margin=0.03, accepted=True)
+    need = w.CriterionNeeds("dip", again, [far, near])
+    monkeypatch.setattr(w, "_task", lambda *_: None)
+    result = SimpleNamespace(criteria=[again], failure=None)
+    monkeypatch.setattr(w, "_computed", lambda *_: {0: result})
+    w.confirm_changes(SimpleNamespace(certificate=None, folder=None), [need], Unused())
+    confirmed = need.confirmed
+    assert confirmed.parameter is near.parameter
+    assert confirmed.change == pytest.approx(0.44)  # a tenth further than to the limit
+    assert confirmed.value == pytest.approx(2.0 * 1.44)
+    assert confirmed.straight_line == pytest.approx(-0.4 + 0.44)
+    assert confirmed.met
 
 
 class Unused:
