@@ -74,7 +74,7 @@ def test_the_page_needs_nothing_but_itself(page):
         "What was studied",
         "Operating point",
         "Trajectories along grid.X_L",
-        "Design of pod_p",
+        "Design of POD-P",
         "Time responses",
         "Communication step",
         "Provenance",
