@@ -11,7 +11,8 @@ from dataclasses import replace
 import pytest
 
 import orchestrator as gfor
-from orchestrator.studies.certification.codes.all_codes import ERCOT, FINGRID
+from orchestrator.studies.certification.codes.ercot import ERCOT
+from orchestrator.studies.certification.codes.fingrid import FINGRID
 from orchestrator.studies.certification.files import spare_another
 from orchestrator.studies.certification.inside import FOLDER, taken_out
 from tests.pages.markdown import ROOT, blocks

@@ -153,7 +153,7 @@ class CodeRow(Row):
 
 AnyRow = TypeVar("AnyRow", bound=Row)
 
-_FILE = "codes.toml"
+_FILE = "words.toml"
 _WORDS: dict[str, dict[str, Any]] = tomllib.loads(
     Path(__file__).with_name(_FILE).read_text(encoding="utf-8")
 )
@@ -222,7 +222,7 @@ def _fault_of_rows(key: str, rows: Sequence[Row]) -> str:
 
 @dataclass(frozen=True)
 class GridCode(Generic[AnyRow]):
-    """A code as a table; its words stand in ``codes.toml``.
+    """A code as a table; its words stand in ``words.toml``.
 
     ``title``, ``source``, ``date``: what it is, where its numbers were read, and of when it is; ``where`` it applies;
     ``f_n``: rated frequency of the system [Hz]; ``left_out``: what the code asks and this table does not test, with
@@ -251,7 +251,7 @@ class GridCode(Generic[AnyRow]):
     ) -> "GridCode[AnyRow]":
         """A code with its words.
 
-        ``words``: those of a code that another distribution brings, as a section of ``codes.toml`` has them."""
+        ``words``: those of a code that another distribution brings, as a section of ``words.toml`` has them."""
         place = f"{_FILE}, [{key}]"
         if words is not None:
             place = f"the words of code {key!r}"

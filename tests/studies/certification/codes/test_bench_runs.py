@@ -9,9 +9,10 @@ import pytest
 import orchestrator as gfor
 from orchestrator.simulation.watch.finding import BENCH_RESONANCE
 from orchestrator.studies.certification.codes import bench_point
-from orchestrator.studies.certification.codes.all_codes import CODES, ERCOT
+from orchestrator.studies.certification.codes.all_codes import CODES
 from orchestrator.studies.certification.codes.bench_point import case_name
 from orchestrator.studies.certification.codes.certificate import certify_code
+from orchestrator.studies.certification.codes.ercot import ERCOT
 from orchestrator.studies.certification.codes.rows_again import choose
 from orchestrator.studies.certification.files import save
 from orchestrator.studies.certification.kinds import ROWS

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import pytest
 
 from orchestrator.studies.certification.codes import rows_again
-from orchestrator.studies.certification.codes.all_codes import ERCOT
 from orchestrator.studies.certification.codes.certificate import certify_code
+from orchestrator.studies.certification.codes.ercot import ERCOT
 from orchestrator.studies.certification.request import CertificationRequest
 from orchestrator.studies.points.executor import Serial
 from tests.studies.certification.codes.reactance_source import write_source

@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 
 from orchestrator.studies.certification.codes import criteria as c
-from orchestrator.studies.certification.codes.all_codes import AREAS, CODES, MISO, longest
+from orchestrator.studies.certification.codes.all_codes import CODES
 from orchestrator.studies.certification.codes.bench_point import INTERVAL, RECORDED, BenchResult
 from orchestrator.studies.certification.codes.measured import MeasuredRow, over_a_period
+from orchestrator.studies.certification.codes.miso import MISO
+from orchestrator.studies.certification.codes.nogrr245 import longest
 from orchestrator.studies.certification.codes.programme import jumps, last_machine, ramps, weakening
 from orchestrator.studies.certification.codes.row_verdict import judge_row
+from orchestrator.studies.certification.codes.tr331 import AREAS
 from orchestrator.studies.certification.verdict import verdict_of
 
 TIMES = np.arange(0, 11, 1e-3)

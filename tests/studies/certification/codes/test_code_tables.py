@@ -10,9 +10,10 @@ import pytest
 from orchestrator.core.errors import InputError
 from orchestrator.studies.certification.codes import criteria as c
 from orchestrator.studies.certification.codes import known, row
-from orchestrator.studies.certification.codes.all_codes import CODES, MISO
+from orchestrator.studies.certification.codes.all_codes import CODES
 from orchestrator.studies.certification.codes.bench_point import INTERVAL, BenchResult
 from orchestrator.studies.certification.codes.known import KNOWN, code_for
+from orchestrator.studies.certification.codes.miso import MISO
 from orchestrator.studies.certification.codes.nts631 import NTS
 from orchestrator.studies.certification.codes.programme import voltage
 from orchestrator.studies.certification.codes.row import CodeRow, GridCode
@@ -30,15 +31,15 @@ def without(name):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (None, "codes.toml has no section [cei]; a code has its words there: title, source"),
+        (None, "words.toml has no section [cei]; a code has its words there: title, source"),
         (
             WORDS | {"reading": []},
-            "codes.toml, [cei]: 'reading' is no word of a code; its words are title",
+            "words.toml, [cei]: 'reading' is no word of a code; its words are title",
         ),
-        (without("f_n"), "codes.toml, [cei]: f_n is missing; give the rated frequency [Hz]"),
+        (without("f_n"), "words.toml, [cei]: f_n is missing; give the rated frequency [Hz]"),
         (
             WORDS | {"left_out": "much"},
-            "codes.toml, [cei]: left_out = 'much'; give a list of texts",
+            "words.toml, [cei]: left_out = 'much'; give a list of texts",
         ),
     ],
 )

@@ -9,8 +9,8 @@ import orchestrator as gfor
 from orchestrator.core.errors import ComponentError
 from orchestrator.studies.black_box.frequency_response import Excitation
 from orchestrator.studies.certification.codes import bench_point, perturbation_plot
-from orchestrator.studies.certification.codes.all_codes import ERCOT
 from orchestrator.studies.certification.codes.certificate import certify_code
+from orchestrator.studies.certification.codes.ercot import ERCOT
 from orchestrator.studies.certification.codes.frequency.limits import asked_stiffness
 from orchestrator.studies.certification.codes.known import code_for
 from orchestrator.studies.certification.codes.perturbation_plot import measure_stiffness

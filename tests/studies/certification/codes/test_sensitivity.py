@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from orchestrator.studies.certification.codes.all_codes import ERCOT
 from orchestrator.studies.certification.codes.bench_point import BenchResult
 from orchestrator.studies.certification.codes.change_point import (
     ChangedCriterion,
@@ -11,6 +10,7 @@ from orchestrator.studies.certification.codes.change_point import (
     margins_with_time,
     mark_of,
 )
+from orchestrator.studies.certification.codes.ercot import ERCOT
 from orchestrator.studies.certification.codes.row_verdict import RowVerdict, judge_row
 from orchestrator.studies.certification.codes.sensitivity import MOST, sensitivity_of
 from orchestrator.studies.sensitivities.parameters import Parameter

@@ -8,8 +8,9 @@ import pytest
 import orchestrator as gfor_api
 from orchestrator.core.errors import InputError
 from orchestrator.studies.certification.codes import what_it_takes as w
-from orchestrator.studies.certification.codes.all_codes import CODES, ERCOT
+from orchestrator.studies.certification.codes.all_codes import CODES
 from orchestrator.studies.certification.codes.certificate import certify_code
+from orchestrator.studies.certification.codes.ercot import ERCOT
 from orchestrator.studies.certification.codes.needs_record import (
     confirmed_text,
     plan_text,
