@@ -18,7 +18,7 @@ from gfor_fmu.converter import P_0, S_N, OuterControl, outer_control
 from gfor_fmu.droop import declare_droop
 from gfor_fmu.inner_loops import inner_loops
 from gfor_fmu.three_phases import V_N
-from gfor_fmu.usual import FORMING
+from gfor_fmu.usual_ranges import FORMING
 from gfor_fmu.virtual_impedance import declare_virtual_impedance
 
 # parameter with which the bridge voltage makes up for the time until it is applied

@@ -13,7 +13,7 @@ from gfor_fmu.inner_loops import inner_loops
 from gfor_fmu.negative_sequence import declare_negative_sequence_drop
 from gfor_fmu.phase_limit import declare_phase_limit
 from gfor_fmu.pod import pod
-from gfor_fmu.usual import FORMING
+from gfor_fmu.usual_ranges import FORMING
 from gfor_fmu.virtual_impedance import declare_virtual_impedance
 
 S_N = 1500.0  # default rating [MVA]: the two-area system's converter

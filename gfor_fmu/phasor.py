@@ -15,7 +15,7 @@ from fmus.toolchain.symbols import Expr, fabs, fmax
 from gfor_fmu.converter import P_0, S_N, Converter, declare_converter_outputs, outer_control
 from gfor_fmu.current_limit import declare_box_limits
 from gfor_fmu.droop import declare_droop
-from gfor_fmu.usual import FORMING
+from gfor_fmu.usual_ranges import FORMING
 from gfor_fmu.virtual_impedance import declare_virtual_impedance
 
 

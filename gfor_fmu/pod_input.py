@@ -4,7 +4,7 @@ from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import declare_port_outputs, device_port
 from gfor_fmu.converter import P_0, S_N, declare_converter, declare_converter_outputs
-from gfor_fmu.usual import FORMING
+from gfor_fmu.usual_ranges import FORMING
 
 
 def grid_forming_converter_pod_input() -> Model:

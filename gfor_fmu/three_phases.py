@@ -14,7 +14,7 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import declare_rating, port_at
 from fmus.toolchain.symbols import sqrt
 from gfor_fmu.converter import P_0, S_N, declare_converter, declare_converter_outputs
-from gfor_fmu.usual import FORMING
+from gfor_fmu.usual_ranges import FORMING
 
 V_N = 230.0  # default rated voltage [kV, line to line, rms]
 

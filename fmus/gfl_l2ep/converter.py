@@ -1,7 +1,7 @@
 """Both variants: at a bus whose voltage is instantaneous, and at one of a network of admittances."""
 
 from fmus.converter_parts.bus_voltage import extrapolated_voltage
-from fmus.converter_parts.usual import FOLLOWING
+from fmus.converter_parts.usual_ranges import FOLLOWING
 from fmus.gfl_l2ep.control import Following, following_converter
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from fmus.converter_parts.current_control import current_control, declare_free_gains
 from fmus.converter_parts.filter import APPENDIX, Filter, declare_filter, filter_equations
-from fmus.converter_parts.usual import FOLLOWING
+from fmus.converter_parts.usual_ranges import FOLLOWING
 from fmus.grid_following.current_limit import Limited
 from fmus.grid_following.outer_control import TRACKING_TIME, Measured, outer_control
 from fmus.grid_following.pll import Frame, phase_locked_loop

@@ -6,7 +6,7 @@ variant. Its emf is the voltage that the converter's current gives at the capaci
 
 from fmus.converter_parts.bus_voltage import extrapolated_voltage
 from fmus.converter_parts.filter import APPENDIX, FilterData, declare_filter_data
-from fmus.converter_parts.usual import FOLLOWING
+from fmus.converter_parts.usual_ranges import FOLLOWING
 from fmus.grid_following.converter import P_0, S_N, Signals, declare_signals
 from fmus.grid_following.outer_control import Measured, outer_control
 from fmus.grid_following.pll import phase_locked_loop

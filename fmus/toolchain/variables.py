@@ -35,7 +35,7 @@ class Usual:
         return self.low <= value <= self.high or (self.or_zero and value == 0)
 
 
-def usual_beside(module: str, file: str = "usual.toml") -> dict[str, Usual]:
+def usual_beside(module: str, file: str = "usual_ranges.toml") -> dict[str, Usual]:
     """Usual ranges by parameter, of a file beside a module."""
     tables = tomllib.loads(Path(module).with_name(file).read_text(encoding="utf-8"))["usual"]
     return {

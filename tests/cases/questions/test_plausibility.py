@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from fmus.converter_parts.usual import FOLLOWING
+from fmus.converter_parts.usual_ranges import FOLLOWING
 from fmus.regfm_a1.model import USUAL
 from fmus.synchronous_generator.declarations import MACHINE
 from fmus.synchronous_generator.dyr_records import DYR_RECORDS
@@ -16,7 +16,7 @@ from fmus.toolchain.description import model_description
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port_variables import RATED
 from fmus.toolchain.variables import Usual
-from gfor_fmu.usual import FORMING
+from gfor_fmu.usual_ranges import FORMING
 from orchestrator.cases.case import built_in_cases, load_case
 from orchestrator.cases.form.unusual_value import UnusualValue
 from orchestrator.cases.questions import plausibility

@@ -13,7 +13,7 @@ from fmus.toolchain.native_fmu import NativeFmu
 from fmus.toolchain.port import declare_port_outputs, device_port
 from fmus.toolchain.symbols import Expr
 from gfor_fmu.converter import P_0, S_N, declare_converter, declare_converter_outputs
-from gfor_fmu.usual import FORMING
+from gfor_fmu.usual_ranges import FORMING
 from orchestrator.core.errors import AnalysisError, ErrorKind
 from orchestrator.face.cli import main
 from orchestrator.linear.models.linearization import Blocks, compose

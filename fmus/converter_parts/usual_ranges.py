@@ -5,4 +5,4 @@ from fmus.toolchain.variables import usual_beside
 
 CONVERTER = TRANSFORMER | usual_beside(__file__)
 # of converters that follow the grid by a PLL
-FOLLOWING = CONVERTER | usual_beside(__file__, "following.toml")
+FOLLOWING = CONVERTER | usual_beside(__file__, "usual_ranges_following.toml")
