@@ -21,6 +21,9 @@ _checked: dict[Path, tuple[int, int, int]] = {}
 """Files found intact in this process: inode, size and time of the last change."""
 
 
+_KEY_DIGITS = 32  # of a SHA-256: 128 bits, so that no two contents meet
+
+
 class CacheError(SetupError):
     """The cache cannot be written."""
 
@@ -28,7 +31,8 @@ class CacheError(SetupError):
 def cache_directory(kind: str) -> Path:
     """Folder for one kind of built file; ``GFOR_COSIM_CACHE`` overrides its parent.
 
-    Contents are named by a hash of what they were made from: deleting the folder is always safe."""
+    Contents are named by a hash of what they were made from (`key_of`, `key_of_digest`): deleting the folder is always
+    safe."""
     root = os.environ.get("GFOR_COSIM_CACHE")
     if root:
         return Path(root) / kind
@@ -39,6 +43,16 @@ def cache_directory(kind: str) -> Path:
     else:
         base = Path(os.environ.get("XDG_CACHE_HOME") or _home() / ".cache")
     return base / "gfor-cosim" / kind
+
+
+def key_of(*texts: str) -> str:
+    """Name of what is made of these texts, such as a library of its source, its target and the compiler."""
+    return key_of_digest(hashlib.sha256("\0".join(texts).encode()).hexdigest())
+
+
+def key_of_digest(digest: str) -> str:
+    """Name of what has a hash already, such as an FMU, by all that it is made from (`exporter.Recipe.digest`)."""
+    return digest[:_KEY_DIGITS]
 
 
 def intact(path: Path) -> bool:

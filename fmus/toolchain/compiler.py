@@ -3,7 +3,6 @@
 A released wheel brings the orchestrator's own libraries for every platform in the folder ``prebuilt``, so that running
 FMUs needs no compiler."""
 
-import hashlib
 import re
 import struct
 import subprocess
@@ -12,7 +11,7 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
-from fmus.toolchain.cache import cache_directory, intact, keep
+from fmus.toolchain.cache import cache_directory, intact, keep, key_of
 from fmus.toolchain.extras import installed_version, require
 from fmus.toolchain.temporary import own_folder, remove, sweep_partial_files
 
@@ -112,9 +111,7 @@ def prebuild(*files: Path) -> None:
 
 def _prebuilt(source: str, platform: str) -> Path:
     """Path of a source's library in the package, if the package contains one. Another source gives another name."""
-    key = hashlib.sha256("\0".join([source, platform, *FLAGS, *_MAC_FLAGS]).encode()).hexdigest()[
-        :32
-    ]
+    key = key_of(source, platform, *FLAGS, *_MAC_FLAGS)
     return _PREBUILT / f"{key}{ENDINGS[platform]}"
 
 
@@ -145,8 +142,7 @@ def compile_for(source: str, target: str, ending: str, libraries: Sequence[str] 
     flags = _flags(target, ending)
     own = _WASM_FLAGS if target == WASM else ()
     parts = [source, target, *recipe(), *own, *libraries]
-    key = hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
-    library = cache_directory("libraries") / f"{key}{ending}"
+    library = cache_directory("libraries") / f"{key_of(*parts)}{ending}"
     if intact(library):
         return library
     sweep_partial_files(cache_directory("libraries").parent)

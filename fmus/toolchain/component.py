@@ -3,7 +3,6 @@
 ziglang compiles the FMU's source and ``c/fmi3_component.c``; ``wasm-tools`` of the Bytecode Alliance makes a component
 of that, by the declarations in ``c/fmi3_component.wit``."""
 
-import hashlib
 import shutil
 import subprocess
 import sys
@@ -11,7 +10,7 @@ from functools import cache
 from pathlib import Path
 from xml.etree.ElementTree import Element, register_namespace, tostring
 
-from fmus.toolchain.cache import cache_directory, intact, keep
+from fmus.toolchain.cache import cache_directory, intact, keep, key_of
 from fmus.toolchain.compiler import WASM, compile_for, recipe
 from fmus.toolchain.extras import SetupError
 from fmus.toolchain.temporary import own_folder, remove
@@ -42,8 +41,7 @@ def component_of(source: str) -> bytes:
     declarations = _C / "fmi3_component.wit"
     code = f"{source}\n{(_C / 'fmi3_component.c').read_text(encoding='utf-8')}"
     told = (code, declarations.read_text(encoding="utf-8"), *recipe(), _version_of(_program()))
-    key = hashlib.sha256("\0".join(told).encode()).hexdigest()[:32]
-    kept = cache_directory("libraries") / f"{key}.component.wasm"
+    kept = cache_directory("libraries") / f"{key_of(*told)}.component.wasm"
     if intact(kept):
         return kept.read_bytes()
     core = compile_for(code, WASM, ".wasm")

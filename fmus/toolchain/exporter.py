@@ -6,7 +6,7 @@ from typing import Protocol
 
 from fmus.toolchain.archive import packed, write_archive
 from fmus.toolchain.bill import BILL, bill_of
-from fmus.toolchain.cache import cache_directory, intact, keep
+from fmus.toolchain.cache import cache_directory, intact, keep, key_of_digest
 from fmus.toolchain.compiler import host_platform
 from fmus.toolchain.model import Model
 
@@ -48,7 +48,7 @@ def export(
 
 
 def kept_at(recipe: Recipe) -> Path:
-    folder = cache_directory("fmus") / f"{recipe.cache_prefix}{recipe.digest[:32]}"
+    folder = cache_directory("fmus") / f"{recipe.cache_prefix}{key_of_digest(recipe.digest)}"
     return folder / f"{recipe.model.name}.fmu"
 
 

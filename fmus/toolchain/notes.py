@@ -16,7 +16,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from fmus.toolchain.cache import CacheError, cache_directory, intact, keep
+from fmus.toolchain.cache import CacheError, cache_directory, intact, keep, key_of
 from fmus.toolchain.extras import installed_version
 
 _OWN = ("fmus", "gfor_fmu")
@@ -61,10 +61,7 @@ def note_of(entry: EntryPoint, asked: str) -> Path | None:
         *machine(),
         *(f"{name} {installed_version(name)}" for name in _LIBRARIES),
     ]
-    return (
-        cache_directory("notes")
-        / f"{hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]}.json"
-    )
+    return cache_directory("notes") / f"{key_of(json.dumps(parts))}.json"
 
 
 def machine() -> tuple[str, ...]:

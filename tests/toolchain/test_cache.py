@@ -1,5 +1,6 @@
 """Built files that were damaged or altered since are never run: they are built again, and one line says so."""
 
+import hashlib
 import os
 import shutil
 import subprocess
@@ -9,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from fmus.toolchain.cache import CacheError, intact, keep
+from fmus.toolchain.cache import CacheError, intact, keep, key_of, key_of_digest
 from fmus.toolchain.compiler import compile_library, host_platform
 from orchestrator.devices.fmi.instance import is_ours
 
@@ -58,6 +59,13 @@ def test_a_damaged_library_is_compiled_again(own_cache, damage, caplog):
     caplog.clear()
     assert intact(library)
     assert not caplog.text
+
+
+def test_a_key_follows_from_each_text_and_from_where_one_ends():
+    key = hashlib.sha256(b"source\0linux64\0-O2").hexdigest()
+    assert key_of("source", "linux64", "-O2") == key_of_digest(key) == key[:32]
+    others = [("source", "linux64"), ("sourc", "elinux64", "-O2"), ("source", "win64", "-O2")]
+    assert len({key_of(*texts) for texts in others} - {key[:32]}) == len(others)
 
 
 def test_a_file_is_intact_at_each_moment_of_its_being_written_anew(tmp_path, monkeypatch, caplog):

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fmus.toolchain.cache import CacheError, cache_directory, intact, keep
+from fmus.toolchain.cache import CacheError, cache_directory, intact, keep, key_of
 from fmus.toolchain.extras import installed_version
 from orchestrator.cases.networks.branch_keys import BranchKey
 from orchestrator.cases.networks.bus_loads import LoadSum
@@ -67,10 +67,7 @@ def kept_tables(name: str, content: bytes, make: Callable[[], SourceTables]) -> 
     if not versions["pandapower"]:
         return make()
     parts = [name, hashlib.sha256(content).hexdigest(), versions, sys.platform, sys.version, _CODE]
-    path = (
-        cache_directory("networks")
-        / f"{hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]}.json"
-    )
+    path = cache_directory("networks") / f"{key_of(json.dumps(parts))}.json"
     if intact(path):
         return _from_json(json.loads(path.read_bytes()))
     tables = make()
