@@ -25,7 +25,7 @@ from orchestrator.output.results.netcdf import (
     stored_name,
 )
 from orchestrator.output.results.storage import column_attributes, origin_of_rows
-from orchestrator.systems.coupling.recorder import Block
+from orchestrator.systems.coupling.recording_blocks import Block
 
 if TYPE_CHECKING:
     from orchestrator.cases.scenario.prepare import PreparedScenario

@@ -18,7 +18,7 @@ from orchestrator.core.late import xr
 from orchestrator.core.safe_files import replacing, write_bytes, write_text
 from orchestrator.output.results.netcdf import netcdf_image, stored_name
 from orchestrator.systems.coupling.filtered_recorder import FILTER
-from orchestrator.systems.coupling.recorder import BLOCK_ROWS
+from orchestrator.systems.coupling.recording_blocks import BLOCK_ROWS
 
 if TYPE_CHECKING:
     from orchestrator.cases.scenario.prepare import PreparedScenario

@@ -40,7 +40,8 @@ from orchestrator.systems.coupling.bus_relays import Trip
 from orchestrator.systems.coupling.coupled import LateStart
 from orchestrator.systems.coupling.events import Event
 from orchestrator.systems.coupling.filtered_recorder import FilteredRecorder
-from orchestrator.systems.coupling.recorder import Recorder, RowSink
+from orchestrator.systems.coupling.recorder import Recorder
+from orchestrator.systems.coupling.recording_blocks import RowSink
 from orchestrator.systems.coupling.system import System
 
 SETTLING = 2.0

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.systems.coupling.observers import ObservedRun
-from orchestrator.systems.coupling.recorder import Recorder, RowSink
+from orchestrator.systems.coupling.recorder import Recorder
+from orchestrator.systems.coupling.recording_blocks import RowSink
 
 PASS_BAND = 0.4  # frequency up to which the filter lets all pass [1/interval]
 STOP_BAND = 0.5  # frequency from which on it takes all away [1/interval]: half the sampling rate

@@ -1,9 +1,8 @@
-"""Recording of variables at regular communication points, in blocks of rows, and where these go: memory, or whatever
-else takes them."""
+"""Recording of variables at regular communication points; rows go on in blocks (`recording_blocks`)."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from time import monotonic
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,62 +10,13 @@ from numpy.typing import NDArray
 from orchestrator.core.errors import InputError
 from orchestrator.devices.fmi.component import RealBatch
 from orchestrator.systems.coupling.observers import ObservedRun
-
-Block = tuple[int, NDArray[np.float64], NDArray[np.float64]]
-"""Number of its first row; times [s], shape (n,); values, shape (n, number of names)."""
-
-
-class RowSink(Protocol):
-    def begin(self, names: Sequence[str]) -> None:
-        """Called once before the first block, with the names of the columns."""
-
-    def keep(self, first: int, times: NDArray[np.float64], values: NDArray[np.float64]) -> None:
-        """Take a block; one that was not full comes again, longer, with the same number of its first row."""
-
-    def resume(self, names: Sequence[str], rows: int) -> Iterator[Block]:
-        """Forget all rows from number ``rows`` on, and give the blocks before; the last one may be continued."""
-
-
-class MemoryRows:
-    """Each ``every``-th row of the blocks that it is given, as arrays that grow."""
-
-    def __init__(self, columns: int, every: int = 1) -> None:
-        self._columns, self._every = columns, every
-        self._times: list[NDArray[np.float64]] = []
-        self._values: list[NDArray[np.float64]] = []
-
-    def clear(self) -> None:
-        self._times, self._values = [], []
-
-    def keep(self, first: int, times: NDArray[np.float64], values: NDArray[np.float64]) -> None:
-        begin = -first % self._every
-        self._times.append(times[begin :: self._every].copy())
-        self._values.append(values[begin :: self._every].copy())
-
-    def joined(
-        self, first: int, times: NDArray[np.float64], values: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Times and values of all that is kept, and of a last block that is not complete."""
-        if len(self._times) > 1:
-            self._times = [np.concatenate(self._times)]
-            self._values = [np.concatenate(self._values)]
-        begin = -first % self._every
-        rest = times[begin :: self._every], values[begin :: self._every]
-        if not self._times:
-            return rest
-        if not len(rest[0]):
-            return self._times[0], self._values[0]
-        return np.concatenate([self._times[0], rest[0]]), np.concatenate([self._values[0], rest[1]])
-
-
-BLOCK_ROWS = 8192  # most rows of a block
-# size of the largest block; the more is recorded, the fewer rows a block has
-_BLOCK_BYTES = 8_000_000
-_FEWEST_ROWS = 64
-# rows of a block that is not full wait for so long until they are handed to the sink [s]
-PATIENCE = 5.0
-# they wait longer where handing them over would take a larger part of the time than this
-_SHARE = 0.01
+from orchestrator.systems.coupling.recording_blocks import (
+    PATIENCE,
+    MemoryRows,
+    RowSink,
+    patience_after,
+    rows_of_block,
+)
 
 
 class Recorder:
@@ -151,8 +101,7 @@ class Recorder:
         self._since = monotonic()
 
     def _allocate(self, expected: int) -> None:
-        width = 8 * (len(self.names) + 1)
-        rows = max(_FEWEST_ROWS, min(BLOCK_ROWS, _BLOCK_BYTES // width))
+        rows = rows_of_block(len(self.names))
         if self._position is None:
             rows = min(rows, expected)
         self._times, self._block = np.empty(rows), np.empty((rows, len(self.names)))
@@ -186,7 +135,7 @@ class Recorder:
         if self._sink is not None and self._handed < self._filled:
             self._failed, begin = True, monotonic()
             self._sink.keep(self._first, times, values)
-            self._failed, self._patience = False, max(PATIENCE, (monotonic() - begin) / _SHARE)
+            self._failed, self._patience = False, patience_after(monotonic() - begin)
         self._handed = self._filled
         if self._filled == len(self._times):
             self._kept.keep(self._first, times, values)

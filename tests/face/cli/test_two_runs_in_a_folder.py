@@ -128,8 +128,8 @@ def test_rows_that_are_not_the_runs_are_not_published(gfor, monkeypatch, tmp_pat
     source = tmp_path / "other" / "dip" / "trajectory.nc" if planted else None
     monkeypatch.setattr(Loses, "planted", source, raising=False)
     monkeypatch.setattr(command, "Progress", Loses)
-    monkeypatch.setattr("orchestrator.systems.coupling.recorder.BLOCK_ROWS", 8)
-    monkeypatch.setattr("orchestrator.systems.coupling.recorder._FEWEST_ROWS", 8)
+    monkeypatch.setattr("orchestrator.systems.coupling.recording_blocks.BLOCK_ROWS", 8)
+    monkeypatch.setattr("orchestrator.systems.coupling.recording_blocks._FEWEST_ROWS", 8)
     words = ("run", "infinite_bus", "--scenario", "dip", "--stop", "1")
     code, _, error = gfor(*words, "--out", tmp_path / "out")
     assert not (tmp_path / "out" / "dip").exists()

@@ -7,6 +7,7 @@ import pytest
 
 from orchestrator.core.errors import ResultsError
 from orchestrator.systems.coupling import recorder as module
+from orchestrator.systems.coupling import recording_blocks
 from orchestrator.systems.coupling.recorder import Recorder
 
 
@@ -58,7 +59,7 @@ def run(monkeypatch):
             return np.array([{"y": 0.1 * k, "z": -k}[name] for name in self.names])
 
     monkeypatch.setattr(module, "RealBatch", Batch)
-    monkeypatch.setattr(module, "BLOCK_ROWS", 64)
+    monkeypatch.setattr(recording_blocks, "BLOCK_ROWS", 64)
     return run
 
 
