@@ -263,3 +263,13 @@ def test_the_active_current_comes_back_by_its_ramp():
 def test_a_start_beyond_a_limit_is_refused(values, rule):
     broken = refused(Evaluated(MODEL, AT | values))
     assert any(rule in text for text in broken), broken
+
+
+@pytest.mark.parametrize(("generates", "least"), [(True, 0.0), (False, -0.3)])
+def test_only_a_storage_draws_power_while_the_frequency_is_high(generates, least):
+    """The order is held at Pmin; what generates alone feeds nothing there."""
+    values = {"FreqFlag": True, "GenFlag": generates, "Pmin": -0.3, "Ddn": 50.0}
+    values |= {"fdbd1": 0.0, "fdbd2": 0.0}
+    turning = 2 * np.pi * 2.0  # 2 Hz above rated
+    found = driven(values, lambda t: np.exp(1j * turning * t), 0.8)[-1]
+    assert found["I_p_command"] == pytest.approx(least, abs=1e-3)

@@ -69,3 +69,8 @@ def test_the_current_fades_behind_an_open_breaker():
 def test_the_frequency_rises_at_the_rate_that_is_set():
     found = bench(**{"source.rise": 4 / 60}).rates(injected(0.7 - 0.1j))
     assert found["source.delta_omega"] == pytest.approx(4 / 60)
+
+
+def test_it_bears_the_name_by_which_it_is_asked_for():
+    """Its FMU's file and the identifier within are called so: letters, digits and underscores."""
+    assert build_model("test_bench").name == "test_bench"

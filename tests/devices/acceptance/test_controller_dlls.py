@@ -232,6 +232,15 @@ def test_an_honest_one_fails_in_nothing(written, kind):
     assert not [(r.check, r.evidence) for r in results if r.verdict is Verdict.FAIL]
 
 
+def test_what_ends_with_an_error_whatever_its_inputs_is_not_judged(written):
+    """A file that is missing, say: what it would do with it is not known, and is no fault."""
+    source = lag(do=LATE + '{ s->error = "no file"; return 2; }')
+    (result,) = check_dll(written(source), ("dll_restart",), seconds=0.5)
+    assert (result.check, result.verdict) == ("dll_restart", Verdict.NOT_APPLICABLE)
+    assert "it ends with an error whatever its inputs: Model_Outputs at 0.00" in result.evidence
+    assert "no file" in result.evidence
+
+
 def test_a_thread_left_behind_and_other_rounding_are_remarks(written):
     source = lag(
         head="#include <pthread.h>\n#include <unistd.h>\n#include <fenv.h>\n"

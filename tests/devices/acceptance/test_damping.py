@@ -1,9 +1,11 @@
 """A damping controller is tried for what it does, and each fault of it is told by its cause."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
+from orchestrator.devices.acceptance.checks import damping
 from orchestrator.devices.acceptance.checks.subject import Use
 from orchestrator.devices.acceptance.runner import check_fmu
 from orchestrator.devices.binding.binding import bind
@@ -47,6 +49,18 @@ def test_a_fault_of_a_damping_controller_is_told_by_its_cause(name, gallery):
 @pytest.mark.parametrize("name", SLOW)
 def test_what_takes_longer_to_show_is_told_as_well(name, gallery):
     assert "POD-P" in failure_of(gallery, name).evidence
+
+
+@pytest.mark.parametrize(
+    ("usual", "larger"), [(1e-4, [3e-4, 1.2e-3]), (1e-3, [3e-3, 6e-3]), (4e-3, [6e-3, 6e-3])]
+)
+def test_a_controller_is_tried_in_swings_three_and_twelve_times_as_large(usual, larger):
+    """Up to 0.6 % of the rated frequency, beyond which no network swings."""
+    sizes = []
+    trial = damping._Trial(SimpleNamespace(effects=lambda swing: sizes.append(swing.size) or ()))
+    trial._size = usual
+    assert trial._larger() is None
+    assert sizes == pytest.approx(larger)
 
 
 @pytest.mark.parametrize("name", ["pod_of_the_minute", "pod_dead_after_a_date"])

@@ -38,3 +38,20 @@ def test_slopes_of_sides_or_sizes_that_differ_are_no_linear_model(
     model = slopes.linearize_slopes(exchange, 0.0, 1e-4)
     assert (model is not None) is alike
     assert not alike or model.A_c == pytest.approx(np.array([[(up + down) / 2]]))
+
+
+@pytest.mark.parametrize(
+    ("settable", "rates", "gives"),
+    [
+        (True, ("der(x)", "der(y)"), True),
+        (True, ("der(x)",), False),
+        (False, ("der(x)", "der(y)"), False),
+        (False, (), False),
+    ],
+)
+def test_slopes_need_states_that_can_be_set_and_a_derivative_of_each(settable, rates, gives):
+    description = SimpleNamespace(
+        states=("x", "y"), rates=rates, states_are_settable=settable, name="a"
+    )
+    exchange = SimpleNamespace(component=SimpleNamespace(description=description))
+    assert slopes.gives_slopes(exchange) is gives

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from orchestrator.core.errors import AnalysisError
+from orchestrator.core.errors import AnalysisError, InputError
+from orchestrator.face.cli import admittance as command
 from orchestrator.face.cli.admittance import _summary
 from orchestrator.studies.black_box.fitting import fit
 from orchestrator.studies.black_box.frequency_response import Excitation, measure
@@ -100,3 +101,24 @@ def test_the_summary_begins_with_its_heading(capsys):
         < shown.index("Poles of the fitted model")
         < shown.index("15.72")
     )
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        ((), "measured"),
+        (("--scan", "s.txt"), "a scan is in siemens; give the rated voltage as well"),
+        (("--scan", "s.txt", "--voltage", "230 kV"), "measured"),
+        (("--voltage", "230 kV"), "measured"),
+    ],
+)
+def test_a_rated_voltage_is_needed_for_a_scan_alone(words, reason, gfor, tmp_path, monkeypatch):
+    """The answer is in per unit; a scan has no base that could be stated in it."""
+
+    def measure(*_):
+        raise InputError("it is measured")
+
+    monkeypatch.setattr(command, "_measured", measure)
+    code, _, error = gfor("fmu", "admittance", tmp_path / "a.fmu", *words, "--out", tmp_path / "o")
+    assert code == 2
+    assert reason in " ".join(error.split())

@@ -51,6 +51,25 @@ def test_numbers_beside_curves_stand_in_the_legend():
     assert axes.get_legend_handles_labels()[1] == ["SG + GFOR", "tie 1", "tie 2"]
 
 
+def test_a_ring_stands_where_each_curve_begins_also_after_a_gap():
+    figures = [{"damping": 5.0, "real": -0.1 * k, "frequency": 0.5 + 0.1 * k} for k in range(4)]
+    sweep = SimpleNamespace(
+        trajectories=[SimpleNamespace(name="tie", case_name="tie")],
+        prepared=bare_scenario(title="SG + GFOR"),
+        unstable=lambda axes: [],
+    )
+    samples = SimpleNamespace(
+        result=SimpleNamespace(scenarios=[sweep]),
+        axes=[SimpleNamespace(key="grid.X_L", unit="pu", values=(0.1, 0.2, 0.3, 0.4, 0.5))],
+        of=lambda *_: [((place,), figures[k]) for k, place in enumerate((0, 1, 2, 4))],
+    )
+    axes = Figure().subplots()
+    assert plots.draw_trajectories(axes, samples)
+    rings = [line for line in axes.lines if line.get_markerfacecolor() == "white"]
+    found = [(float(ring.get_xdata()[0]), float(ring.get_ydata()[0])) for ring in rings]
+    assert found == [(0.0, 0.5), (pytest.approx(-0.3), pytest.approx(0.8))]
+
+
 def test_damping_and_frequency_of_named_modes(drawn):
     assert plots.plot_named(SimpleNamespace(axes=["X_L"]), None)
     labelled(drawn[0])
@@ -88,6 +107,35 @@ def test_failures_are_listed_up_to_a_number_and_the_rest_is_counted(monkeypatch,
     texts = tables.remarks(SimpleNamespace(result=result))
     assert len(texts) == 1 + tables._FAILURES_SHOWN + beyond
     assert [text for text in texts if "more" in text] == ["  … and 1 more, in sweep.csv"] * beyond
+
+
+def test_a_trajectory_is_told_by_its_ends_and_where_it_is_damped_least_and_most(monkeypatch):
+    monkeypatch.setattr(tables, "axis_label", lambda axis: "X_L [pu]")
+    values = (0.1, 0.2, 0.3, 0.4)
+    figures = [
+        {"frequency": f, "damping": d, "similarity": s, "named": d < 8}
+        for f, d, s in ((0.5, 5.0, 1.0), (0.6, 2.5, 0.97), (0.65, 9.0, 0.8), (0.7, 7.0, 0.9))
+    ]
+    sweep = SimpleNamespace(
+        trajectories=[SimpleNamespace(name="tie", case_name="tie")],
+        prepared=bare_scenario(title="SG + GFOR"),
+    )
+    samples = SimpleNamespace(
+        result=SimpleNamespace(scenarios=[sweep]),
+        axes=["X_L"],
+        of=lambda *_: [((k,), found) for k, found in enumerate(figures)],
+        setting=lambda place: {"grid.X_L": values[place[0]]},
+    )
+    table = tables.trajectories(samples)
+    assert [[str(cell) for cell in column.cells] for column in table.columns] == [
+        ["SG + GFOR: tie"],
+        ["0.500 → 0.700"],
+        ["5.00 → 7.00"],
+        ["2.50 at 0.2"],
+        ["9.00 at 0.3"],
+        ["4, named at 3"],
+        ["0.80"],
+    ]
 
 
 def test_shares_are_shown_in_percent():
