@@ -25,6 +25,7 @@ from fmus.synchronous_generator.excitation.static import scrx, sexs, st1a, st4b
 from fmus.synchronous_generator.excitation.two_limits import bbsex1
 from fmus.synchronous_generator.excitation.without_regulator import external, manual
 from fmus.synchronous_generator.limiters.common import Limiter, Limiters
+from fmus.synchronous_generator.limiters.oel2c import oel2c
 from fmus.synchronous_generator.limiters.overexcitation import maxex1, maxex2
 from fmus.synchronous_generator.limiters.uel2c import uel2c
 from fmus.synchronous_generator.limiters.underexcitation import mnlex2, uel1
@@ -148,7 +149,12 @@ STABILIZERS: dict[str, Stabilizer | None] = {
     "pod": pod,
     "pod_input": pod_input,
 }
-OELS: dict[str, Limiter | None] = {NONE: None, "maxex1": maxex1, "maxex2": maxex2}
+OELS: dict[str, Limiter | None] = {
+    NONE: None,
+    "maxex1": maxex1,
+    "maxex2": maxex2,
+    "oel2c": oel2c,
+}
 UELS: dict[str, Limiter | None] = {NONE: None, "mnlex2": mnlex2, "uel1": uel1, "uel2c": uel2c}
 """Limiters of over- and of underexcitation."""
 

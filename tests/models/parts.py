@@ -3,6 +3,7 @@
 import numpy as np
 
 from fmus.synchronous_generator.excitation.common import Regulated
+from fmus.synchronous_generator.limiters.common import Limiters
 from fmus.synchronous_generator.machine import Start
 from fmus.synchronous_generator.parts import EXCITERS, GOVERNORS, STABILIZERS
 from fmus.synchronous_generator.variants import Shaft
@@ -72,6 +73,25 @@ def stabilizer(name, values=None, *, sees_voltage=False, sees_all=False, scope="
     shaft = Shaft(1 + speed, Expr(0.8), power, Expr(0.8), v_t, Expr(V_T), phase, P_m, Expr(100))
     m.output("v_s", part(m, shaft), "pu", "Signal", base="S_n")
     return Evaluated(m.build(), {f"{scope}.{key}": value for key, value in (values or {}).items()})
+
+
+def limiter(values, **named):
+    """A limiter between field current, field voltage and the stator's current; its regulator gives what it is given."""
+    m = ModelBuilder("alone", "The limiter alone")
+    starts = {"I_fd": E_FD, "E_fd": E_FD, "i_re": 0.7, "i_im": -0.1}
+    I_fd, E_fd, i_re, i_im = (
+        m.input(name, "pu", name, base="S_n", start=start) for name, start in starts.items()
+    )
+    terminal = Phasor(V_T + 0 * E_fd, 0.0)
+    seen = Regulated(START, lambda E: terminal, I_fd, i=Phasor(i_re, i_im), v_0=Phasor(V_T, 0.0))
+
+    def passed(m, seen):
+        m.output("v_s", seen.v_s, "pu", "Sum of the limiters' signals", base="S_n")
+        return E_fd, terminal.magnitude()
+
+    Limiters(**named).regulate(m, seen, passed)
+    (scope,) = named
+    return Evaluated(m.build(), {f"{scope}.{key}": value for key, value in values.items()})
 
 
 def integrated(model, inputs, end, step=1e-3, x=None):

@@ -4,13 +4,9 @@ import numpy as np
 import pytest
 
 from fmus.synchronous_generator.composed import synchronous_generator, synchronous_generator_phasor
-from fmus.synchronous_generator.excitation.common import Regulated
-from fmus.synchronous_generator.limiters.common import Limiters
 from fmus.synchronous_generator.parts import EXCITERS, OELS, UELS
-from fmus.toolchain.frames import Phasor
-from fmus.toolchain.model_builder import ModelBuilder
 from tests.models.one_machine import OneMachine, three_buses
-from tests.models.parts import AT_BUS, BUS, CURRENT, E_FD, START, V_T, integrated, refused
+from tests.models.parts import AT_BUS, BUS, CURRENT, E_FD, V_T, integrated, limiter, refused
 from tests.support.evaluated import Evaluated
 
 POINTS = {"EFDRATED": 2.0, "EFD1": 1.2, "TIME1": 3.0, "EFD2": 1.5, "TIME2": 1.0, "EFD3": 2.0}
@@ -18,25 +14,6 @@ TIMED = POINTS | {"TIME3": 0.5, "EFDDES": 1.0, "KMX": 0.1, "VLOW": -0.2}
 """At rest u = 1.1, below EFD1 = 1.2."""
 
 CIRCLE = {"K_F2": 0.0, "T_F2": 1.0, "K_M": 2.0, "T_M": 0.1, "MELMAX": 9.0, "Q_0": 1.3, "R": 1.9}
-
-
-def limiter(values, **named):
-    """A limiter between field current, field voltage and the stator's current; its regulator gives what it is given."""
-    m = ModelBuilder("alone", "The limiter alone")
-    starts = {"I_fd": E_FD, "E_fd": E_FD, "i_re": 0.7, "i_im": -0.1}
-    I_fd, E_fd, i_re, i_im = (
-        m.input(name, "pu", name, base="S_n", start=start) for name, start in starts.items()
-    )
-    terminal = Phasor(V_T + 0 * E_fd, 0.0)
-    seen = Regulated(START, lambda E: terminal, I_fd, i=Phasor(i_re, i_im), v_0=Phasor(V_T, 0.0))
-
-    def passed(m, seen):
-        m.output("v_s", seen.v_s, "pu", "Sum of the limiters' signals", base="S_n")
-        return E_fd, terminal.magnitude()
-
-    Limiters(**named).regulate(m, seen, passed)
-    (scope,) = named
-    return Evaluated(m.build(), {f"{scope}.{key}": value for key, value in values.items()})
 
 
 def overexcited(I_fd, E_fd=E_FD, end=1.0, values=TIMED, name="maxex2", x=None):

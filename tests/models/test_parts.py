@@ -149,6 +149,8 @@ def test_every_field_of_a_dyr_record_sets_a_parameter_of_its_part(name):
         ("WEHGOV", 50),
         ("COMP", 1),
         ("IEEEVC", 2),
+        ("OEL2C", 43),
+        ("OEL2CU1", 49),
         ("STAB1", 7),
         ("IEEEST", 19),
         ("PSS2A", 23),

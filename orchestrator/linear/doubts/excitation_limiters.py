@@ -1,16 +1,33 @@
 """Warnings of limiters of excitation that act where a machine starts, or would act there in time."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from orchestrator.core.options import Option
 from orchestrator.systems.coupling.master import Master
 
 _KINDS = {"oel": "overexcitation", "uel": "underexcitation"}
 _ACTS = "acts"  # output of a limiter: 1 while it acts
-_LIMIT = "EFD1"  # first point of an inverse time
-_TAKEN = "first_point"  # the same as it is taken
 _SIGNAL = "signal"  # what it adds to the voltage reference [pu]
 _YES = 0.5  # above it an output says yes
+
+
+@dataclass(frozen=True)
+class _Limit:
+    """A limit that an operating point may lie beyond; ``taken``: the same as it is taken; ``then``: its effect."""
+
+    name: str
+    taken: str
+    words: str
+    then: str
+
+
+_LIMITS = (
+    _Limit("EFD1", "first_point", "the first point", "the time runs beyond"),
+    _Limit("I_TFpu", "I_TFpu_taken", "the pickup", "the time runs beyond"),
+    _Limit("I_inst", "I_inst_taken", "the instantaneous limit", "it holds beyond"),
+    _Limit("I_lim", "I_lim_taken", "the thermal limit", "it holds beyond"),
+)
 
 
 def limiter_warnings(master: Master) -> tuple[str, ...]:
@@ -22,11 +39,12 @@ def _of_machine(master: Master, name: str) -> Iterator[str]:
     component = master.components[name]
     variables = component.description.variables
     for scope, kind in _KINDS.items():
-        acts, signal, limit, taken = (f"{scope}.{x}" for x in (_ACTS, _SIGNAL, _LIMIT, _TAKEN))
+        acts, signal = f"{scope}.{_ACTS}", f"{scope}.{_SIGNAL}"
         if not {acts, signal} <= variables.keys():
             continue
-        timed = [limit, taken] if {limit, taken} <= variables.keys() else []
-        found = component.values([acts, signal, *timed])
+        limits = [one for one in _LIMITS if f"{scope}.{one.taken}" in variables]
+        names = [f"{scope}.{name}" for one in limits for name in (one.name, one.taken)]
+        found = component.values([acts, signal, *names])
         without = f"{Option.SET} {name}.{scope}=none"
         remedy = f"correct its data, or the operating point; without it: {without}"
         if found[acts] > _YES:
@@ -35,9 +53,11 @@ def _of_machine(master: Master, name: str) -> Iterator[str]:
                 f"{found[signal]:+.4g} pu to the voltage reference ({scope}.{_SIGNAL}): modes are those with it "
                 f"acting; {remedy}"
             )
-        elif timed and found[taken] > found[limit]:
-            yield (
-                f"{name}: the operating point is beyond the first point of its limiter of {kind}, {limit} = "
-                f"{found[limit]:g}: it is let rest, and the time runs beyond {found[taken]:.4g} ({taken}) only; "
-                f"{remedy}"
-            )
+            continue
+        for one in limits:
+            limit, taken = f"{scope}.{one.name}", f"{scope}.{one.taken}"
+            if found[taken] > found[limit]:
+                yield (
+                    f"{name}: the operating point is beyond {one.words} of its limiter of {kind}, {limit} = "
+                    f"{found[limit]:g}: it is let rest, and {one.then} {found[taken]:.4g} ({taken}) only; {remedy}"
+                )

@@ -73,3 +73,16 @@ def test_a_limiter_that_acts_moves_modes():
     assert free.electromechanical is not None
     moved = abs(acting.electromechanical.eigenvalue - free.electromechanical.eigenvalue)
     assert moved > 1e-3
+
+
+def test_modes_tell_of_an_operating_point_beyond_the_limits_of_oel2c():
+    """The field current of the start is 2.035 pu; modes are those without the limiter."""
+    values = {"sg1.oel": "oel2c", "sg1.oel.I_TFpu": 1.9, "sg1.oel.I_inst": 1.95}
+    beyond, free = (compute_modes(prepared(x)) for x in (values | {"sg1.oel.I_lim": 1.8}, {}))
+    pickup, instantaneous = about_limiters(beyond.warnings)
+    assert "beyond the pickup of its limiter of overexcitation, oel.I_TFpu = 1.9" in pickup
+    assert "beyond the instantaneous limit of its limiter" in instantaneous
+    assert beyond.electromechanical is not None
+    assert free.electromechanical is not None
+    wanted = free.electromechanical.eigenvalue
+    assert beyond.electromechanical.eigenvalue == pytest.approx(wanted, rel=1e-6)

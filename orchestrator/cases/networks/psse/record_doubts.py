@@ -19,6 +19,11 @@ _LEAST_SIGNALS = ("uel.V_UIMIN", "uel.V_ULMIN")
 _INVERSE_TIME = (("oel.EFD1", "oel.TIME1"), ("oel.EFD2", "oel.TIME2"), ("oel.EFD3", "oel.TIME3"))
 """Points of MAXEX1's and MAXEX2's inverse time: field [of the rated one], and the time there [s]."""
 
+_MOST_SIGNALS = ("oel.V_OELMAX1", "oel.V_OELMAX2", "oel.V_OELMAX3")
+"""Upper limits of OEL2C's signal [pu]; the lowest one counts."""
+
+_INPUTS_OF_OEL2C = (1, 2)  # field voltage and field current
+
 _LIMITS_OF_COMPENSATORS = (
     ("Vrefmin", "Vrefmax", "the slow control cannot move the reference as it is meant"),
     ("Bmax", "Bshrt", "Bmax is taken for both, and the device has no short-time rating"),
@@ -38,6 +43,7 @@ def doubts_of_machine(
     yield from _chosen_limits(records)
     yield from _offsets(records, values)
     yield from _inverse_times(records, values)
+    yield from _of_oel2c(records, values)
     yield from _turned_limits(records, values)
     x_d2, x_source = values.get("machine.X_d2"), machine.source.imag
     if x_d2 is None or abs(x_source - x_d2) <= _SAME * abs(x_d2):
@@ -109,6 +115,41 @@ def _inverse_times(
             "beyond the point from which its time runs; look at EFDDES"
         )
         yield DoubtOfRecord("oel.EFDDES", record.place, text, "a limiter's aim beyond its limit")
+
+
+def _of_oel2c(
+    records: Sequence[DynamicRecord], values: Mapping[str, float]
+) -> Iterator[DoubtOfRecord]:
+    """Ask about an OEL2C that limits what our part does not see, or that is made for a gate."""
+    most = min((values[name] for name in _MOST_SIGNALS if name in values), default=0.0)
+    record = next((one for one in records if "oel.I_TFpu" in _sets(one.name)), None)
+    if record is None or "oel.input" not in values:
+        return
+    if values["oel.input"] not in _INPUTS_OF_OEL2C:
+        text = (
+            f"{record.name} has INPUT = {values['oel.input']:g}, and 1 is the field voltage, 2 the field current: the "
+            "field voltage is limited; where it means the exciter's own field current, look at KSCALE, ITFPU, IINST "
+            "and ILIM, or give INPUT = 1 or 2"
+        )
+        yield DoubtOfRecord(
+            "oel.input", record.place, text, f"an input of {record.name} unlike 1, 2"
+        )
+    if most > 0:
+        text = (
+            f"{record.name} rests at up to {most:g} pu, and its exciter adds that to the voltage reference: it acts "
+            "before its limit; where it is added the least of VOELMAX1, VOELMAX2 and VOELMAX3 is 0, at a gate far "
+            "above: correct it, or the exciter's record"
+        )
+        yield DoubtOfRecord(
+            "oel.V_OELMAX1", record.place, text, "a limiter that rests above 0 at a sum"
+        )
+    given = given_values(record, KNOWN_RECORDS[record.name].fields, {*KNOWN_RECORDS, *FIELDS})
+    if given["IFDRATED"] not in (0, 1):
+        text = (
+            f"{record.name} has IFDRATED = {given['IFDRATED']:g}, which no public diagram uses: its limits are taken "
+            "per unit of KSCALE times the field voltage or current; make KSCALE 1/IFDRATED where they are not"
+        )
+        yield DoubtOfRecord("oel.K_scale", record.place, text, f"a rated current of {record.name}")
 
 
 def _turned_limits(

@@ -79,6 +79,56 @@ def test_uel2c_has_its_fields_in_the_order_of_interpss(tmp_path):
     assert any("UEL2C has KUF = 0.1" in doubt.text for doubt in model.doubts)
 
 
+OEL2C = (
+    "{input} 1 .015 .08 .02 .10 .35 .8 .01 .08 0 -1 0 -1 {most} -1 0 .12 .4 .04 .7 .02 1.02 .9 1.45 "
+    "1.10 .05 1.8 .2 2 .05 .5 -.5 1 -1 .2 1 0 0 -2 2 .1 {rated} /\n"
+)
+"""Constants of OEL2C as a test of InterPSS has them (`Oel2cLimiterTest`)."""
+
+
+@pytest.mark.parametrize("begin", ["1 'OEL2C' 1 ", "1 'USRMDL' 1 'OEL2CU1' 10 0 2 41 8 8 "])
+def test_oel2c_has_its_fields_in_the_order_of_interpss(begin, tmp_path):
+    record = begin + OEL2C.format(input=2, most=0, rated=1)
+    model, _, asked = read(tmp_path, GENROU + SEXS + record)
+    own = {n.removeprefix("oel."): x for n, x in model.parameters.items() if n.startswith("oel.")}
+    assert model.parts["oel"] == "oel2c"
+    stages = {"input": 2, "SW": 1, "T_C1": 0.015, "T_B1": 0.08, "T_C2": 0.02, "T_B2": 0.1}
+    control = {"K_P": 0.35, "K_I": 0.8, "K_D": 0.01, "T_D": 0.08, "V_OELMIN3": -1, "V_OELMIN1": -1}
+    latch = {"I_reset": 0, "T_en": 0.12, "T_off": 0.4, "I_THoff": 0.04, "K_scale": 0.7}
+    limits = {"T_R": 0.02, "K_act": 1.02, "I_TFpu": 0.9, "I_inst": 1.45, "I_lim": 1.1, "T_A": 0.05}
+    time = {"c_1": 1.8, "K_1": 0.2, "c_2": 2, "K_2": 0.05, "V_INVMAX": 0.5, "V_INVMIN": -0.5}
+    timer = {"FIXED_ru": 1, "FIXED_rd": -1, "T_FCL": 0.2, "T_max": 1, "T_min": 0, "K_FB": 0}
+    wanted = stages | control | latch | limits | time | timer
+    wanted |= {"K_rd": -2, "K_ru": 2, "K_ZRU": 0.1}
+    assert {name: own[name] for name in wanted} == wanted
+    assert len(own) == 42
+    assert asked == []
+    assert not [doubt for doubt in model.doubts if doubt.variable.startswith("oel")]
+
+
+@pytest.mark.parametrize(
+    ("values", "variable", "said"),
+    [
+        ({"input": 3, "most": 0, "rated": 1}, "oel.input", "has INPUT = 3, and 1 is the field"),
+        ({"input": 1, "most": 0, "rated": 2.5}, "oel.K_scale", "has IFDRATED = 2.5, which no"),
+    ],
+)
+def test_what_oel2c_cannot_stand_for_is_asked_about(values, variable, said, tmp_path):
+    model, _, _ = read(tmp_path, GENROU + SEXS + "1 'OEL2C' 1 " + OEL2C.format(**values))
+    (doubt,) = (one for one in model.doubts if one.variable.startswith("oel"))
+    assert doubt.variable == variable
+    assert said in doubt.text
+
+
+def test_an_oel2c_of_a_gate_beside_an_exciter_that_adds_is_asked_about(tmp_path):
+    record = "1 'OEL2C' 1 " + OEL2C.format(input=1, most=10, rated=1).replace(
+        "0 -1 0 -1 10", "99 -9 99 -9 10"
+    )
+    model, _, _ = read(tmp_path, GENROU + SEXS + record)
+    (doubt,) = (one for one in model.doubts if one.variable == "oel.V_OELMAX1")
+    assert doubt.text.startswith("OEL2C rests at up to 10 pu, and its exciter adds that")
+
+
 def used(tmp_path, *texts):
     model, uses, asked = read(tmp_path, GENROU + "".join(texts))
     by_name = {use.kind: use.use for use in uses}
