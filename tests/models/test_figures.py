@@ -18,6 +18,7 @@ import pytest
 from fmus.grid.network import Line, Load, Network, Port, Shunt, ThreeWinding, Zip
 from fmus.synchronous_generator.parts import EXCITERS, GOVERNORS, MACHINES, STABILIZERS
 from fmus.toolchain.catalogue import build_model, entry_of, model_names, needs_arguments
+from fmus.vendor_dll.circuit import converter_circuit
 from tests.models.parts import exciter, governor, stabilizer
 from tests.support.evaluated import Evaluated
 
@@ -26,6 +27,11 @@ TABLE = Path(__file__).with_name("figures.json")
 
 def of_catalogue(name, **parts):
     return Evaluated(build_model(name, **parts))
+
+
+def circuit(kind, bridge):
+    """What stands around a vendor's controller."""
+    return Evaluated(converter_circuit("circuit", kind, bridge))
 
 
 SMALL = Network(
@@ -82,6 +88,10 @@ MODELS = {
         f"stabilizer {name}": partial(stabilizer, name)
         for name, part in STABILIZERS.items()
         if part is not None
+    },
+    **{
+        f"circuit {kind} {bridge}": partial(circuit, kind, bridge)
+        for kind, bridge in (("L", "modulation"), ("LC", "voltage"), ("LCL", "modulation"))
     },
 }
 
