@@ -11,14 +11,20 @@ from fmus.toolchain.frames import power
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.native_fmu import NativeFmu
 from fmus.toolchain.port import declare_port_outputs, device_port
+from fmus.toolchain.python_fmu import PythonFmu
 from fmus.toolchain.symbols import Expr
 from gfor_fmu.converter import P_0, S_N, declare_converter, declare_converter_outputs
 from gfor_fmu.usual_ranges import FORMING
 from orchestrator.core.errors import AnalysisError, ErrorKind
+from orchestrator.devices.fmi.description import read_description
 from orchestrator.face.cli import main
+from orchestrator.linear.models.drifting_states import examine_held
 from orchestrator.linear.models.linearization import Blocks, compose
 from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.studies.modes.modes import running
+from orchestrator.systems.coupling.master import Master
+from orchestrator.systems.coupling.schedule import gauss_seidel
+from orchestrator.systems.coupling.system import System
 from tests.support.scenarios import prepare_one
 
 HOURS = 2.0  # of the store, at S_n
@@ -76,6 +82,23 @@ def battery(moves=0.0, grows=0.0):
     declare_port_outputs(m, port, converter.current * (1 + moves * (charge - 0.6)))
     declare_converter_outputs(m, converter)
     return m.build()
+
+
+@pytest.mark.parametrize("grows", [0.0, 0.5])
+def test_a_rate_is_watched_over_a_thousand_steps(grows, tmp_path):
+    """The charge is 0.2·(t + grows·t²/2), of which a step from t to t + H sees the mean rate."""
+    m = ModelBuilder("charge", "A charge whose rate grows")
+    age, charge = (m.state(name, 0.0, "1", name) for name in ("age", "charge"))
+    m.derivative(age, Expr(1.0))
+    m.derivative(charge, 0.2 * (1 + grows * age))
+    m.output("y", Expr(0.0), "1", "Nothing")
+    system, h = System(), 1e-3
+    system.add("store", read_description(export(PythonFmu(m.build()), tmp_path)))
+    with Master(system, gauss_seidel((("store",),)), h) as master:
+        (held,) = examine_held(master, ["store.charge"])
+    assert held.rate == pytest.approx(0.2 * (1 + grows * h / 2))
+    assert held.later_rate == pytest.approx(0.2 * (1 + grows * (999.5 * h)), rel=1e-3)
+    assert held.is_even is (grows == 0.0)
 
 
 def linear_model(case):
