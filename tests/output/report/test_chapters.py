@@ -13,7 +13,7 @@ import xarray as xr
 from orchestrator.core.errors import InputError
 from orchestrator.output.report.html.chapters.files import chapters_of
 from orchestrator.output.report.html.chapters.runs import of_run
-from orchestrator.output.report.html.chapters.studies import of_site, of_sweep
+from orchestrator.output.report.html.chapters.studies import of_screening, of_site, of_sweep
 from orchestrator.output.report.html.elements import with_units_held
 from orchestrator.output.report.html.first_page import first_page
 from orchestrator.output.report.html.least_damped import LeastDamped
@@ -234,7 +234,7 @@ def test_the_first_page_answers_every_study(folders, tmp_path):
         "not as required: with K = 200 pu the mode has 18.00 % of damping, 10.60 % before, 20.00 % wanted",
         "not known whether stable everywhere: 2 operating points, 3 outages; least damped 0.930 Hz, 3.80 %",
         "mon, sg3: no power flow: sg5 would need 129 %",
-        "growth outside of the range was counted at some points only",
+        "growth outside of the range was counted at some of them only",
         "vendor.fmu: wrong rated frequency",
         "anything after it",
         "It passes at all.",
@@ -616,10 +616,44 @@ def test_open_points_of_a_site_are_those_that_the_study_names(tmp_path):
     assert not of_site(file, site | remark).not_judged
     open_points = ["outage tie: it has no power flow"]
     assert of_site(file, site | remark | {"open_points": open_points}).not_judged == open_points
+    (left_out,) = of_site(file, site | {"terminals_left_out": ["bus_30", "bus_31"]}).not_judged
+    assert left_out.startswith("the terminals of units, bus_30, bus_31")
 
 
 SHAKY = {"stable": False, "verdict": "UNSTABLE", "frequency_hz": 0.57, "damping_percent": -0.9}
 CALM = {"stable": True, "verdict": "stable", "frequency_hz": 0.76, "damping_percent": 22.6}
+
+
+@pytest.mark.parametrize(
+    ("counted", "sure", "lost"),
+    [
+        (2, "growth outside of the range was counted at 2 of 7 of them only", True),
+        (0, "growth outside of the range was counted at 0 of 7 of them only", True),
+        (7, "growth was counted at all frequencies", False),
+        (True, "growth was counted at all frequencies", False),
+        (False, "growth outside of the range was counted at some of them only", False),
+    ],
+)
+def test_a_screening_says_at_how_many_cases_growth_was_counted(tmp_path, counted, sure, lost):
+    """Two counted cases of 49 were once told as *at all frequencies*; results of earlier versions have yes or no."""
+    found = of_screening(
+        tmp_path / "screening.json", SCREENING | {"counted_at_all_frequencies": counted}
+    )
+    assert found.sure == f"7 of 8 cases computed, {sure}"
+    assert any("--whole" in text for text in found.not_judged) == lost
+    assert not any("not computed yet" in text for text in found.not_judged)
+
+
+def test_an_unfinished_screening_names_what_is_left(tmp_path):
+    found = of_screening(tmp_path / "screening.json", SCREENING | {"complete": False})
+    assert "the cases that were not computed yet" in found.not_judged
+
+
+def test_an_answer_that_begins_with_a_name_keeps_its_letters(tmp_path):
+    """``gfor site --buses Bus_29`` finds no bus."""
+    found = of_screening(tmp_path / "screening.json", SCREENING)
+    assert ">bus_29 is the best" in first_page([replace(found, answer="bus_29 is the best")])
+    assert ">Not as required: no" in first_page([replace(found, answer="not as required: no")])
 
 
 def test_of_two_scenarios_only_the_unstable_one_is_red(tmp_path):

@@ -38,14 +38,18 @@ def _short_answers(chapters: Sequence[Chapter], notes: dict[str, str]) -> str:
         case []:
             return ""
         case [alone]:
-            shade, answer = SHADES[alone.good], escape(alone.answer)
-            verdict = (
-                f'<p class="verdict"><b class="{shade}">{answer[:1].upper()}{answer[1:]}</b></p>'
-            )
+            shade, answer = SHADES[alone.good], escape(_as_sentence(alone.answer))
+            verdict = f'<p class="verdict"><b class="{shade}">{answer}</b></p>'
             return _answer_with_notes(alone, verdict, notes)
         case _:
             columns = ["Question", "Answer", "How sure", "Not judged"]
             return table("In short", columns, [_row(one, notes) for one in chapters], left=4)
+
+
+def _as_sentence(text: str) -> str:
+    """Begin a text with a capital letter, unless its first word is an identifier, such as ``bus_29``."""
+    first = text.split(maxsplit=1)[0].rstrip(",:;") if text else ""
+    return f"{text[0].upper()}{text[1:]}" if first.isalpha() else text
 
 
 def _of_scenarios(chapter: Chapter, notes: dict[str, str]) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 import xarray as xr
 
 from orchestrator.cases.questions.idle_values import DAMPING_CONTROLLERS
-from orchestrator.core.errors import number_of
+from orchestrator.core.errors import few, number_of
 from orchestrator.core.truth import all_true
 from orchestrator.output.report.colours import colour
 from orchestrator.output.report.html import studies
@@ -44,34 +44,50 @@ def of_screening(file: Path, c: Content) -> Chapter:
         )
     lost = [c["beyond_rating"]] if c.get("beyond_rating") else []
     lost += [f"{f['point']}, {f['outage']}: {f['status']}: {f['why']}" for f in c["failures"]]
-    growth = (
-        "growth was counted at all frequencies"
-        if c["counted_at_all_frequencies"]
-        else ("growth outside of the range was counted at some points only")
-    )
+    if not c.get("complete", True):
+        lost.append("the cases that were not computed yet")
+    computed = int(c["items"]) - len(c["failures"])
+    counted = c["counted_at_all_frequencies"]
+    if not isinstance(counted, bool) and counted < computed:
+        lost.append(
+            f"growth outside of the range at {computed - counted} of {computed} cases: --whole counts it"
+        )
     return Chapter(
         file,
         "Which operating point and which outage is worst?",
         answer,
         c["stable"],
-        f"{number_of(c['items'], 'case')} computed, {growth}",
+        f"{computed} of {number_of(c['items'], 'case')} computed, {_growth_counted(counted, computed)}",
         lost,
         page="screening.html",
         least=told,
     )
 
 
+def _growth_counted(counted: int, computed: int) -> str:
+    """Tell at how many cases growth at any frequency was counted; results of earlier versions say yes or no."""
+    everywhere = counted if isinstance(counted, bool) else counted >= computed
+    if everywhere:
+        return "growth was counted at all frequencies"
+    some = "some" if isinstance(counted, bool) else f"{counted} of {computed}"
+    return f"growth outside of the range was counted at {some} of them only"
+
+
 def of_site(file: Path, c: Content) -> Chapter:
     sure = "; ".join(c["sure"])
     good = bool(c["confirmed"]) or None if c["agrees"] else False
     least = [LeastDamped.of(mode) for mode in c.get("modes", ())[:1]]
+    terminals = c.get("terminals_left_out", ())
+    lost = [*c.get("open_points", ())]
+    if terminals:
+        lost.append(f"the terminals of units, {few(terminals, _SHOWN)}: --buses 'bus_*' takes them")
     return Chapter(
         file,
         "Where does a converter help most?",
         c["answer"],
         good,
         sure,
-        c.get("open_points", ()),
+        lost,
         page="site.html",
         least=least,
     )
