@@ -76,3 +76,28 @@ def test_every_question_of_a_page_is_asked_by_tab_and_enter():
     assert "What is a mode?" in asked
     assert len(asked) >= 3
     assert "A mode is one of the ways in which the system swings" in answer
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
+@pytest.mark.parametrize("name", ["two_area", "kundur"])
+def test_a_telephone_shows_a_page_without_scrolling_sideways(name):
+    """A scenario's long title once made the page wider than the screen, and a mode's name hid who takes part in it."""
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as tools:
+        browser = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        view = browser.new_page(viewport={"width": 390, "height": 844})
+        view.goto((ROOT / ".docs" / "live" / f"{name}.html").as_uri())
+        view.get_by_role("button", name="What is a mode?").wait_for()
+        view.locator("td.text").first.wait_for()
+        hidden = view.evaluate(
+            "[document.documentElement, ...document.querySelectorAll('.scroll')]"
+            ".map(part => part.scrollWidth - part.clientWidth)"
+        )
+        signs = view.evaluate(
+            "[...document.querySelectorAll('svg text')].map(text => text.textContent)"
+        )
+        browser.close()
+    assert max(hidden) == 0
+    powers = [text for text in signs if re.fullmatch(r"[-−]?\d\.\d+e.*", text)]
+    assert powers
+    assert not [text for text in powers if "-" in text]

@@ -36,7 +36,7 @@ function draw(name, attributes = {}, ...children) {
 }
 function number(x, digits = 4) {
   if (x === null || x === undefined || Number.isNaN(x)) return "–";
-  return (typeof x === "number" ? (Math.abs(x) >= 1e5 || (x && Math.abs(x) < 1e-3) ? x.toExponential(3) : String(+x.toPrecision(digits))) : String(x)).replace("-", "−");
+  return (typeof x === "number" ? (Math.abs(x) >= 1e5 || (x && Math.abs(x) < 1e-3) ? x.toExponential(3) : String(+x.toPrecision(digits))) : String(x)).replace(/-(?=[\d.])/g, "−");
 }
 function fixed(x, digits) { return x === null || x === undefined || Number.isNaN(x) ? "–" : x.toFixed(digits).replace("-", "−"); }
 
