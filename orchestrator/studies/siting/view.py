@@ -537,6 +537,8 @@ def _map(result: SiteResult, seen: SeenMode, figures: Figures) -> str:
     }
     who = ", ".join(share_text(entry) for entry in list(seen.mode.by_component.items())[:3])
     text = f"{_called(seen)} ({who}): the redder and larger a bus, the farther support there moves the mode."
+    if result.terminals:
+        text += " The terminals of units are drawn, and are no candidates."
     return figures.add(
         network_map(
             seen.label,

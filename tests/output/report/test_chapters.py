@@ -17,7 +17,7 @@ from orchestrator.output.report.html.chapters.studies import of_screening, of_si
 from orchestrator.output.report.html.elements import with_units_held
 from orchestrator.output.report.html.first_page import first_page
 from orchestrator.output.report.html.least_damped import LeastDamped
-from orchestrator.output.report.html.page import write_report
+from orchestrator.output.report.html.page import _PICTURE, write_report
 from orchestrator.output.results import origin
 from orchestrator.output.results.manifest import ResultsWarning, read_manifest, write_manifest
 from orchestrator.studies.sweep.limit import Ending, ParameterLimit, Until
@@ -642,6 +642,22 @@ def test_a_screening_says_at_how_many_cases_growth_was_counted(tmp_path, counted
     assert found.sure == f"7 of 8 cases computed, {sure}"
     assert any("--whole" in text for text in found.not_judged) == lost
     assert not any("not computed yet" in text for text in found.not_judged)
+
+
+def test_a_page_of_one_study_asks_its_question_once_above_the_answer(tmp_path):
+    text = written([made(tmp_path / "screen", "screening", SCREENING)], tmp_path, short=True)
+    assert text.count('<p class="question">') == 0
+    assert "<h1>Which operating point and which outage is worst?</h1>" in text
+    design = written([made(tmp_path / "design", "design", SHEET)], tmp_path, short=True)
+    assert design.count('<p class="question">') == 1  # its title names the controller
+
+
+def test_a_picture_takes_its_legend_along_to_the_first_page():
+    """The reddest bus of a siting need not be the best place: the caption says what the colours are."""
+    caption = "<figcaption><b>Figure 1.</b> the redder</figcaption>"
+    text = f'<figure id="figure-1"><svg class="chart">…</svg>{caption}</figure><p>further</p>'
+    (found,) = re.findall(_PICTURE, text, re.DOTALL)
+    assert found.endswith(caption)
 
 
 def test_an_unfinished_screening_names_what_is_left(tmp_path):

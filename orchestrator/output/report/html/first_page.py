@@ -19,13 +19,15 @@ _LONGEST = 240
 """Characters of each of them: three lines of the page."""
 
 
-def first_page(chapters: Sequence[Chapter]) -> str:
-    """Return the verdicts by scenario, then the answers of all other studies: one as a sentence, several in a table."""
+def first_page(chapters: Sequence[Chapter], title: str = "") -> str:
+    """Return the verdicts by scenario, then the answers of all other studies: one as a sentence, several in a table.
+
+    ``title``: the page's, which stands above; a question that it asks is not asked again."""
     open_ = Counter(text for one in chapters for text in dict.fromkeys(one.not_judged))
     shared = [text for text, count in open_.items() if count > 1]
     notes = {text: f"note {k}" for k, text in enumerate(shared, start=1)}
-    by_scenario = "".join(_of_scenarios(one, notes) for one in chapters if one.lines)
-    in_short = _short_answers([one for one in chapters if not one.lines], notes)
+    by_scenario = "".join(_of_scenarios(one, notes, title) for one in chapters if one.lines)
+    in_short = _short_answers([one for one in chapters if not one.lines], notes, title)
     below = "".join(
         f"<p>{name[0].upper()}{name[1:]}: {escape(short(text, _LONGEST))}</p>"
         for text, name in notes.items()
@@ -33,14 +35,14 @@ def first_page(chapters: Sequence[Chapter]) -> str:
     return f'<div class="answers">{by_scenario}{in_short}{below}</div>'
 
 
-def _short_answers(chapters: Sequence[Chapter], notes: dict[str, str]) -> str:
+def _short_answers(chapters: Sequence[Chapter], notes: dict[str, str], title: str) -> str:
     match chapters:
         case []:
             return ""
         case [alone]:
             shade, answer = SHADES[alone.good], escape(_as_sentence(alone.answer))
             verdict = f'<p class="verdict"><b class="{shade}">{answer}</b></p>'
-            return _answer_with_notes(alone, verdict, notes)
+            return _answer_with_notes(alone, verdict, notes, title)
         case _:
             columns = ["Question", "Answer", "How sure", "Not judged"]
             return table("In short", columns, [_row(one, notes) for one in chapters], left=4)
@@ -52,12 +54,12 @@ def _as_sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:]}" if first.isalpha() else text
 
 
-def _of_scenarios(chapter: Chapter, notes: dict[str, str]) -> str:
+def _of_scenarios(chapter: Chapter, notes: dict[str, str], title: str) -> str:
     beside = "".join(f"<p>{escape(text)}</p>" for text in chapter.beside)
-    return _answer_with_notes(chapter, f"{verdicts(chapter.lines)}{beside}", notes)
+    return _answer_with_notes(chapter, f"{verdicts(chapter.lines)}{beside}", notes, title)
 
 
-def _answer_with_notes(chapter: Chapter, answer: str, notes: dict[str, str]) -> str:
+def _answer_with_notes(chapter: Chapter, answer: str, notes: dict[str, str], title: str) -> str:
     """Return a study's question, its answer, and in short notes below how sure that is."""
     below = [
         ("How sure", escape(short(chapter.sure, 2 * _LONGEST))),
@@ -65,7 +67,8 @@ def _answer_with_notes(chapter: Chapter, answer: str, notes: dict[str, str]) -> 
         ("Results", escape(", made by ".join(_places_and_options(chapter)))),
     ]
     told = "".join(f"<li>{name}: {text}</li>" for name, text in below if text)
-    question = f'<p class="question">{escape(chapter.question)}</p>'
+    asked = chapter.question == title
+    question = "" if asked else f'<p class="question">{escape(chapter.question)}</p>'
     return f'{question}{answer}<ul class="soft">{told}</ul>'
 
 

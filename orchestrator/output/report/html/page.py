@@ -33,7 +33,10 @@ USED = (
 
 Sections = list[tuple[str, str]]
 Answer = Mapping[str, Any]
-_PICTURE = r'(?:<ul class="legend">[^\n]*?</ul>)?<svg class="chart".*?</svg>|<img .*?>'
+_PICTURE = (
+    r'(?:(?:<ul class="legend">[^\n]*?</ul>)?<svg class="chart".*?</svg>|<img .*?>)'
+    r"(?:<figcaption>.*?</figcaption>)?"
+)
 
 
 def write_report(
@@ -101,7 +104,7 @@ def page(
     # for `changes` of a later page
     answers = held_data("answers", [*[of_all] * bool(differ), *_answers(chapters)])
     above = "".join(paragraphs(False, [text]) for text in (differ, changed) if text)
-    findings = above + first_page(chapters) + picture + found + answers
+    findings = above + first_page(chapters, title) + picture + found + answers
     return document(title, kind, findings, content, names=_names_of(chapters, runs))
 
 
