@@ -89,10 +89,14 @@ def check_dc_lines(draft: Draft) -> None:
             continue
         wanted, found = _power_sent(plans[ends[0]]), _power_fed(plans[ends[1]])
         kilovolts = [plans[name].number("V_dc_0") for name in ends]
-        if max(abs(wanted - found) / wanted, abs(kilovolts[0] / kilovolts[1] - 1)) > _APART:
+        if not wanted and not found:  # both are out of service
+            continue
+        apart = abs(wanted - found) / max(abs(wanted), abs(found))
+        if max(apart, abs(kilovolts[0] / kilovolts[1] - 1)) > _APART:
             text = (
                 f"{ends[0]} sends {wanted:.4g} MW at V_dc_0 = {kilovolts[0]:.4g} kV, and {ends[1]} feeds {found:.4g} "
-                f"MW at {kilovolts[1]:.4g} kV: a DC line cannot start so; set P_0 and V_dc_0 of both"
+                f"MW at {kilovolts[1]:.4g} kV: a DC line cannot start so; set P_0 and V_dc_0 of both, "
+                "or take both out of service"
             )
             draft.note(draft.place_of_component(ends[0]), text)
 

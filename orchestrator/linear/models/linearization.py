@@ -5,9 +5,11 @@ travel one step late, that output as well: an output with direct feed-through fr
 older than itself is memory that the exchange adds. So is what is on its way over a connection with a delay. Everything
 else follows from the states."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 from orchestrator.core.arrays import Matrix
 from orchestrator.core.errors import AnalysisError
@@ -154,7 +156,7 @@ def continuous(blocks: Blocks) -> LinearModel:
             f"components {', '.join(silent)} do not give their derivatives, so no continuous model can be made"
         )
     windows, names = blocks.state_windows(), blocks.state_names()
-    check_feedthrough(blocks, list(blocks.components))
+    check_loops(blocks)
     p, links = len(blocks.output_names), len(blocks.links)
     lines = _delay_lines(blocks, len(names), None)
     newest = np.concatenate([np.arange(p), p + links + np.arange(len(blocks.inputs))])
@@ -316,11 +318,36 @@ def check_feedthrough(blocks: Blocks, names: list[str]) -> None:
         }
         ready = [name for name in waiting if not pending & feedthrough_sources(blocks, name)]
         if not ready:
-            raise AnalysisError(
-                f"direct feed-through closes an algebraic loop through {', '.join(waiting)}; "
-                "one of them must give an output that does not depend directly on its inputs"
-            )
+            raise _loop_through(waiting)
         waiting = [name for name in waiting if name not in ready]
+
+
+def check_loops(blocks: Blocks) -> None:
+    """No output may depend on itself within one instant.
+
+    Two components may tell each other values at once, if no output comes back to itself, as both stations of a DC line
+    do. `check_feedthrough` forbids that, because a component of a run takes all its inputs before it gives outputs."""
+    p = len(blocks.output_names)
+    graph, every = sp.lil_array((p, p), dtype=bool), np.arange(p)
+    for name, c in blocks.components.items():
+        direct, sources = c.D != 0, blocks.sources[name]
+        direct[:, list(blocks.linked(name))] = False
+        direct[:, sources >= p] = False
+        rows, columns = np.nonzero(direct)
+        graph[every[blocks.window[name]][rows], sources[columns]] = True
+    of_itself = graph.diagonal() > 0
+    _, groups = connected_components(graph.tocsr(), directed=True, connection="strong")
+    looped = of_itself | (np.bincount(groups, minlength=p)[groups] > 1)
+    caught = [name for name in blocks.components if looped[blocks.window[name]].any()]
+    if caught:
+        raise _loop_through(caught)
+
+
+def _loop_through(names: Sequence[str]) -> AnalysisError:
+    return AnalysisError(
+        f"direct feed-through closes an algebraic loop through {', '.join(names)}; "
+        "one of them must give an output that does not depend directly on its inputs"
+    )
 
 
 def feedthrough_sources(blocks: Blocks, name: str) -> set[int]:

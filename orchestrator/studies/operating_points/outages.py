@@ -144,10 +144,9 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
         for x in network.lines
         if x.B and x.name not in opened | charged and {x.from_bus, x.to_bus} & set(dead)
     )
+    gone = [*out_units, *(n for n in units if part[elements.units[n]] != main)]
     return Remains(
-        units=tuple(
-            dict.fromkeys((*out_units, *(n for n in units if part[elements.units[n]] != main)))
-        ),
+        units=tuple(dict.fromkeys((*gone, *_other_ends(prepared, elements, gone)))),
         loads=loads,
         shunts=tuple(
             x.name for x in network.shunts if x.name in elements.shunts and part[x.bus] != main
@@ -155,6 +154,21 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
         charging=charging,
         ties=tuple(dict.fromkeys(ties)),
         dead=tuple(dead),
+    )
+
+
+def _other_ends(
+    prepared: PreparedScenario, elements: Elements, gone: Sequence[str]
+) -> tuple[str, ...]:
+    """Return the units that go with others: a station of a DC line cannot go on without the one at its other end.
+
+    Two units that feed each other are such stations."""
+    units = {*elements.units}
+    fed = {(c.source.component, c.target.component) for c in prepared.system.connections}
+    return tuple(
+        target
+        for source, target in sorted(fed)
+        if source in gone and target in units and (target, source) in fed
     )
 
 

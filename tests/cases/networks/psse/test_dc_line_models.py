@@ -10,7 +10,9 @@ import xarray as xr
 from orchestrator.core.errors import CaseError
 from orchestrator.linear.models.coupled_state import CoupledState
 from orchestrator.linear.models.linear_model import HELD
-from orchestrator.linear.models.linearization import Blocks, compose
+from orchestrator.linear.models.linearization import Blocks, compose, continuous
+from orchestrator.studies.operating_points.columns import Elements
+from orchestrator.studies.operating_points.outages import what_remains
 from orchestrator.systems.coupling.master import Master
 from tests.cases.networks.psse import raw, records
 from tests.cases.networks.psse.test_devices import lines_of
@@ -309,3 +311,32 @@ def test_an_end_beyond_the_part_that_is_studied_keeps_its_voltage(gfor, tmp_path
         before = master.y.copy()
         master.advance(100)
         assert np.abs(master.y - before).max() < 1e-5
+
+
+def test_without_a_step_its_modes_are_those_of_short_steps(prepared):
+    """Both stations tell each other values at once, and no output comes back to itself."""
+    ready = prepared()
+    with Master(ready.system, ready.schedule, ready.step_size) as master:
+        exact = np.linalg.eigvals(continuous(Blocks(master, without_step=True)).A)
+        z = np.linalg.eigvals(compose(Blocks(master), master.schedule).A).astype(complex)
+    stepped = np.log(z[np.abs(z) > 0.1]) / ready.step_size
+    swings = exact[(exact.imag > 1) & (exact.imag < 12)]
+    assert len(swings)
+    for value in swings:
+        assert np.abs(stepped / value - 1).min() < 1e-4
+
+
+@pytest.mark.parametrize("lost", [RECTIFIER, INVERTER])
+def test_with_a_station_its_line_is_lost(prepared, lost):
+    ready = prepared()
+    remains = what_remains(ready, Elements.of(ready), [lost])
+    assert {*remains.units} == {RECTIFIER, INVERTER}
+    assert not remains.dead
+
+
+def test_a_line_with_both_ends_out_of_service_is_no_line(prepared):
+    """Its stations feed nothing, and that fits; one alone that feeds does not."""
+    ready = prepared(**{f"{end}__connected": False for end in (RECTIFIER, INVERTER)})
+    assert [ready.system.components[end].number("P_0") for end in (RECTIFIER, INVERTER)] == [0, 0]
+    with pytest.raises(CaseError, match="or take both out of service"):
+        prepared(**{f"{RECTIFIER}__connected": False})
