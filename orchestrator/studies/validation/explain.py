@@ -43,6 +43,8 @@ _MOST_STEPS = 5  # runs in which one is followed
 _SETTLED = 1e-3  # part of the squared error: a smaller gain ends the following
 _MOST_WORDS = 8  # positions of a whole number that are tried
 _GAIN = re.compile(r"[Kk][^a-z]?.*|.*gain.*")  # last part of the name of a controller's gain
+_LIMITS_ARE = (0.9, 2.0)  # times the plant's largest current, as numbers in pu that may be limits
+_LEVELS = (0.95, 0.9, 0.85, 0.8, 0.75, 0.7)  # times that current, at which they are tried
 _MOST_LIMITS = 12  # values that are tried as a limit, with the kinds that would use them
 
 Values = Mapping[str, float | bool]
@@ -64,16 +66,30 @@ def explain_errors(
     if found.explains or not found.finished:
         return found
     short = [cut_event(one, _HELD_AFTER, _HELD_BEFORE) for one in events]
-    other = _search(device.in_step, short, report)
+    other = _search(device.in_step, short, report, _plain_error(device, short))
     return replace(other if other.explains else found, finished=other.finished)
 
 
-def _search(device: PlayedDevice, events: Sequence[RecordedEvent], report: Report) -> CauseSearch:
+def _plain_error(device: PlayedDevice, events: Sequence[RecordedEvent]) -> float:
+    """The rms error of P and Q that plain play-back makes [pu of the rating].
+
+    What gives way makes the error of a wrong model large: a cause that leaves more than plain play-back is none."""
+    errors = [rms_error(device.play(one.recording, one.start).power, one) for one in events]
+    return float(np.sqrt(np.mean([np.hypot(*one) ** 2 for one in errors])))
+
+
+def _search(
+    device: PlayedDevice,
+    events: Sequence[RecordedEvent],
+    report: Report,
+    most: float = float("inf"),
+) -> CauseSearch:
+    """Search all causes; ``most``: rms error that counts as the device's own at most [pu of the rating]."""
     found: list[Explanation] = []
     finished = True
     try:
         for one in _causes(device, events, report):
-            found.append(one)
+            found.append(replace(one, error=min(one.error, most)))
     except KeyboardInterrupt:
         finished = False
     better = sorted((one for one in found if one.left < one.error), key=lambda one: one.left)
@@ -93,6 +109,8 @@ def _causes(
     yield from _numbers(bench, rough, promises)
     yield from _delays(rough, promises)
     yield from _limits(bench)
+    if device.gives_way:
+        yield from _levels(bench, rough)
 
 
 def _looked_at(device: PlayedDevice, events: Sequence[RecordedEvent]) -> list[RecordedEvent]:
@@ -355,6 +373,33 @@ def _limits(bench: _Bench) -> Iterator[Explanation]:
         if likely:
             _, info, values = min(likely, key=lambda one: one[0])
             yield from _limiter(bench, info, values)
+
+
+def _levels(bench: _Bench, rough: _Bench) -> Iterator[Explanation]:
+    """Numbers that may be limits of the current, at levels below the plant's largest: one of an axis acts below it.
+
+    A model that is held in step far from the plant shows no level by itself, as `cap_of_current` looks for."""
+    seen = max(_largest_current(one) for one in bench.events)
+    tried: list[tuple[float, VariableInfo, Values]] = []
+    for info in bench.parameters("Real"):
+        value = bench.device.value(info.name)
+        if info.unit != "pu" or not _LIMITS_ARE[0] * seen <= value <= _LIMITS_ARE[1] * seen:
+            continue
+        for part in _LEVELS:
+            level = part * seen
+            bench.report(f"trying {info.name} = {level:.4g}")
+            found = rough.responses({info.name: level})
+            if found is not None:
+                tried.append((_squares(rough.errors(found)), info, {info.name: level}))
+    if tried:
+        _, info, values = min(tried, key=lambda one: one[0])
+        yield from _limiter(bench, info, values)
+
+
+def _largest_current(event: RecordedEvent) -> float:
+    """Largest of the measured currents [pu of the rating]."""
+    good = event.recording.good
+    return float(np.abs(event.recording.power[good] / event.recording.voltage[good]).max())
 
 
 def _limiters(bench: _Bench, limit: float) -> Iterator[tuple[VariableInfo, Values]]:
