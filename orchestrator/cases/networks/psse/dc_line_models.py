@@ -22,6 +22,9 @@ from orchestrator.core.errors import InputError, Problem, QuestionTopic, few, nu
 _SHOWN = 8  # lines that a question names; the others are counted
 _KILO = 1000.0
 _ANGLES = {"ALFDY": "a firing angle", "GAMDY": "an extinction angle"}
+_PER_UNIT = 0.01
+"""Part of the start's voltage below which a voltage in kV is no threshold of use, as one in per unit is."""
+
 _BEYOND = math.radians(1e-3)  # by which an angle may be below its least one unasked
 
 
@@ -238,6 +241,18 @@ def _doubts(one: ModelledLine) -> Iterator[tuple[str, str]]:
         if acts and value < p[field]:
             text = f"{field} is {p[field]:g} {unit}, and {what} {value:.4g} {unit} at the start: it acts at once"
             yield f"a DC line that starts below {field}", text
+    if p["VUNBL"] < p["VBLOCK"]:
+        text = (
+            f"VUNBL is {p['VUNBL']:g} pu, below VBLOCK of {p['VBLOCK']:g} pu: between them the line blocks and comes "
+            "back again and again. Correct them"
+        )
+        yield "a DC line whose VUNBL is below VBLOCK", text
+    if 0 < p["VBYPAS"] < _PER_UNIT * pole.inverter_kv:
+        text = (
+            f"VBYPAS is {p['VBYPAS']:g} kV, and the inverter has {pole.inverter_kv:.4g} kV at the start: it hardly "
+            "ever acts. Is it in per unit? Write kV, or 0 for none"
+        )
+        yield "a DC line whose VBYPAS may be in per unit", text
 
 
 def _limit_of_current(p: dict[str, float | bool], kilovolts: float) -> float:

@@ -251,6 +251,15 @@ def test_limits_beyond_which_it_starts_are_asked_about(prepared):
     assert "VBYPAS is 255 kV, and the inverter has 250 kV at the start" in found
 
 
+def test_thresholds_that_do_not_fit_each_other_are_asked_about(prepared):
+    found = texts(prepared(CDC4T.replace(" 0.6 0.65 0.1 80", " 0.7 0.65 0.1 0.3")))
+    assert "VUNBL is 0.65 pu, below VBLOCK of 0.7 pu" in found
+    assert (
+        "VBYPAS is 0.3 kV, and the inverter has 250 kV at the start: it hardly ever acts" in found
+    )
+    assert "hardly ever acts" not in texts(prepared(CDC4T.replace("0.1 80", "0.1 0")))
+
+
 def test_nothing_else_is_asked_about_a_line_within_its_limits(prepared):
     kinds = [q for q in prepared().questions if "TIE 1" in q.text and "CDC4T" in q.text]
     assert len(kinds) == 1
