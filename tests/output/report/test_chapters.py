@@ -772,6 +772,14 @@ def test_a_design_at_the_edge_says_that_there_is_no_margin(tmp_path):
     assert "20.00 % wanted; no margin: 9.57 % with 20 % more gain" in headline
 
 
+def test_a_prediction_says_its_gain_if_a_bound_changed_it(tmp_path):
+    """With K 18.5 pu predicted and 200 pu set, the two modes are of different gains."""
+    text = written([made(tmp_path / "bounded", "design", SHEET)], tmp_path)
+    assert "Predicted with K = 150 pu" in text.replace("\N{NO-BREAK SPACE}", " ")
+    free = written([made(tmp_path / "free", "design", SHEET | {"K_unbounded": 200.0})], tmp_path)
+    assert "redicted with K" not in free
+
+
 def test_a_design_says_its_figures_once_with_units_and_by_the_planners_name(tmp_path):
     remark = "the lower bound of the gain is active, 18.45 pu were computed before it"
     said = f"the target has 18.00 % of damping, 20.00 % are required; {remark}"

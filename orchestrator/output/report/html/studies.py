@@ -199,11 +199,17 @@ def _states(
     return f"<p>{link}: who carries the mode along the sweep.</p>{picture}"
 
 
+def predicted(sheet: Mapping[str, Any]) -> str:
+    """Name the predicted mode: with its gain, where a bound keeps the designed gain away from it."""
+    meant, designed = f"{sheet['K_unbounded']:.4g}", f"{sheet['K']:.4g}"
+    return "predicted" if meant == designed else f"predicted with K = {meant} pu"
+
+
 def design(sheet: dict[str, Any]) -> str:
     sensitivity, target = sheet["sensitivity"], sheet["target_mode"]
     modes = {
         "Target, POD off": target,
-        "Predicted": sheet["predicted_mode"],
+        f"P{predicted(sheet)[1:]}": sheet["predicted_mode"],
         "Achieved": sheet["achieved_mode"],
     }
     lead_lag = (

@@ -26,7 +26,7 @@ from orchestrator.output.report.html.least_damped import LeastDamped
 _SHOWN = 4
 """Parameters that an answer names and a picture shows: the strongest ones."""
 
-_DESIGNED = {"without the controller": "target", "predicted": "predicted", "with it": "achieved"}
+_DESIGNED = ("target", "predicted", "achieved")
 
 
 def of_screening(file: Path, c: Content) -> Chapter:
@@ -109,7 +109,8 @@ def of_design(file: Path, c: Content) -> Chapter:
         answer += f"; no margin: with 20 % more gain {spoilt}"
     told = c.get("remarks", [c["verdict"]])  # results of earlier versions have the verdict alone
     sure = "; ".join(["closed loop of the coupled FMUs", *told])
-    modes = {word: [c[f"{which}_mode"]] for word, which in _DESIGNED.items()}
+    words = ("without the controller", studies.predicted(c), "with it")
+    modes = {word: [c[f"{which}_mode"]] for word, which in zip(words, _DESIGNED, strict=True)}
     content = modes_map("The mode that was designed for", modes) + studies.design(dict(c))
     return Chapter(
         file,
