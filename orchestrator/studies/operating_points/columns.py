@@ -38,6 +38,8 @@ class Elements:
     file: ElementNames = field(default_factory=ElementNames)  # names in the network's file
     # both buses of every branch with two ends
     ends: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    # stations of DC lines, each with the one at its other end
+    other_ends: Mapping[str, str] = field(default_factory=dict)
     of_phasors: bool = False  # whether ends of lines can switch one by one
 
     @classmethod
@@ -67,6 +69,7 @@ class Elements:
             step_ups=own_branches(network, units),
             file=prepared.names,
             ends={line.name: (line.from_bus, line.to_bus) for line in network.lines},
+            other_ends=_other_ends(prepared, units),
             of_phasors=prepared.system.components[table.grid].is_of_phasors,
         )
 
@@ -296,3 +299,12 @@ def _positive(column: str, text: str) -> float:
     if not value > 0:
         raise ValueError(f"{column} = {text}; it must exceed 0")
     return value
+
+
+def _other_ends(prepared: PreparedScenario, units: Mapping[str, str]) -> dict[str, str]:
+    """Return the stations of DC lines, each with the one at its other end.
+
+    Two units that feed each other are such stations."""
+    fed = {(c.source.component, c.target.component) for c in prepared.system.connections}
+    both = [(one, other) for one, other in sorted(fed) if (other, one) in fed]
+    return {one: other for one, other in both if one in units and other in units}

@@ -71,10 +71,21 @@ def _element(text: str, elements: Elements) -> str:
 
 def _of_kind(kind: str, elements: Elements) -> list[str]:
     if kind != "n-1":
-        return list(elements.lines if kind == "lines" else elements.units)
+        return list(elements.lines) if kind == "lines" else _units_alone(elements)
     own = {unit: branch for branch, unit in elements.step_ups.items() if branch in elements.lines}
     lines = [name for name in elements.lines if name not in elements.step_ups]
-    return lines + [f"{name} ({own[name]})" if name in own else name for name in elements.units]
+    return lines + [
+        f"{name} ({own[name]})" if name in own else name for name in _units_alone(elements)
+    ]
+
+
+def _units_alone(elements: Elements) -> list[str]:
+    """Return the units as outages: both stations of a DC line are one, which has the first one's name."""
+    found: list[str] = []
+    for name in elements.units:
+        if elements.other_ends.get(name) not in found:
+            found.append(name)
+    return found
 
 
 @dataclass(frozen=True)
@@ -146,7 +157,11 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
     )
     gone = [*out_units, *(n for n in units if part[elements.units[n]] != main)]
     return Remains(
-        units=tuple(dict.fromkeys((*gone, *_other_ends(prepared, elements, gone)))),
+        units=tuple(
+            dict.fromkeys(
+                (*gone, *(elements.other_ends[n] for n in gone if n in elements.other_ends))
+            )
+        ),
         loads=loads,
         shunts=tuple(
             x.name for x in network.shunts if x.name in elements.shunts and part[x.bus] != main
@@ -154,21 +169,6 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
         charging=charging,
         ties=tuple(dict.fromkeys(ties)),
         dead=tuple(dead),
-    )
-
-
-def _other_ends(
-    prepared: PreparedScenario, elements: Elements, gone: Sequence[str]
-) -> tuple[str, ...]:
-    """Return the units that go with others: a station of a DC line cannot go on without the one at its other end.
-
-    Two units that feed each other are such stations."""
-    units = {*elements.units}
-    fed = {(c.source.component, c.target.component) for c in prepared.system.connections}
-    return tuple(
-        target
-        for source, target in sorted(fed)
-        if source in gone and target in units and (target, source) in fed
     )
 
 

@@ -12,7 +12,7 @@ from orchestrator.linear.models.coupled_state import CoupledState
 from orchestrator.linear.models.linear_model import HELD
 from orchestrator.linear.models.linearization import Blocks, compose, continuous
 from orchestrator.studies.operating_points.columns import Elements
-from orchestrator.studies.operating_points.outages import what_remains
+from orchestrator.studies.operating_points.outages import read_outages, what_remains
 from orchestrator.systems.coupling.master import Master
 from tests.cases.networks.psse import raw, records
 from tests.cases.networks.psse.test_devices import lines_of
@@ -349,3 +349,25 @@ def test_a_line_with_both_ends_out_of_service_is_no_line(prepared):
     assert [ready.system.components[end].number("P_0") for end in (RECTIFIER, INVERTER)] == [0, 0]
     with pytest.raises(CaseError, match="or take both out of service"):
         prepared(**{f"{RECTIFIER}__connected": False})
+
+
+def test_an_outage_of_each_unit_takes_a_dc_line_once(prepared):
+    elements = Elements.of(prepared())
+    assert {RECTIFIER, INVERTER} <= {*elements.units}
+    for kind in ("units", "n-1"):
+        names = " ".join(outage.name for outage in read_outages(kind, elements))
+        assert names.count("dc_TIE_1") == 1
+
+
+def test_a_run_in_which_the_rectifier_trips_is_kept(gfor, prepared, tmp_path):
+    prepared(recorded=True)
+    text = (tmp_path / "case.toml").read_text()
+    trip = f'events = [{{ type = "unit_trip", time = "0.2 s", unit = "{RECTIFIER}" }}]\n'
+    assert "[scenarios.plain]\n" in text
+    (tmp_path / "case.toml").write_text(
+        text.replace("[scenarios.plain]\n", f"[scenarios.plain]\n{trip}")
+    )
+    run = responses(gfor, tmp_path, "--stop", "0.5")
+    for name in (RECTIFIER, INVERTER):
+        assert abs(float(run[f"{name}.p"][0])) > 0.5
+        assert float(run[f"{name}.p"][-1]) == pytest.approx(0, abs=1e-4)
