@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -11,6 +12,9 @@ import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers
 
+_TIMES_SCATTER = 3.0  # times the recordings' scatter, above which what a cause leaves is no scatter
+_LEAST_LEFT = 0.001  # what samples and steps make of a right model [pu of the rating]
+_ALIKE = 1e-6  # part of a value by which two ways to it may differ
 _EXPLAINS = 0.75  # part of the squared error beyond the scatter that an explanation takes away
 _MOST_DELAY = 0.25  # longest delay that is looked for [s]
 _DELAYS = 100  # that are tried at first
@@ -63,6 +67,16 @@ class Explanation:
         """Return whether most of the error goes away with it."""
         return self.share >= _EXPLAINS
 
+    @property
+    def leaves_much(self) -> bool:
+        """Return whether what is left stands far above the scatter: something else is off as well."""
+        return self.left > max(_TIMES_SCATTER * self.noise, _LEAST_LEFT)
+
+    def same_as(self, other: Explanation) -> bool:
+        """Return whether another cause, found on another way, is this one."""
+        mine, its = ((x.cause, x.name, dict(x.beside)) for x in (self, other))
+        return mine == its and math.isclose(self.value, other.value, rel_tol=_ALIKE)
+
     def as_json(self) -> dict[str, Any]:
         return {
             "cause": str(self.cause),
@@ -75,6 +89,7 @@ class Explanation:
             "rms_left_pu": self.left,
             "share": self.share,
             "explains": self.explains,
+            "leaves_much": self.leaves_much,
         }
 
 

@@ -374,6 +374,16 @@ def in_step(comparison: EventComparison) -> EventComparison:
     return comparison
 
 
+def before_setpoint(comparison: EventComparison) -> RecordedEvent:
+    """The event up to where a setpoint changed, of which no cause is told; the whole event where none did."""
+    event = comparison.event
+    for one in comparison.questions:
+        if one.kind is QuestionKind.SETPOINT:
+            stop = float(one.figures["stop"]) - event.recording.begin
+            return cut_event(event, stop - event.windows.begin)
+    return event
+
+
 def _assumed_bases(device: PlayedDevice) -> list[Question]:
     """Ask about what stands for a rating or a rated frequency that the device does not have."""
     if isinstance(device.description, BoundDescription):

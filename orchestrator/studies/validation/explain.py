@@ -25,7 +25,13 @@ from orchestrator.studies.validation.causes import (
     later,
 )
 from orchestrator.studies.validation.device import PlayedDevice
-from orchestrator.studies.validation.event import RecordedEvent, cut_event, noise_before, rms_error
+from orchestrator.studies.validation.event import (
+    RecordedEvent,
+    cut_event,
+    noise_before,
+    rms_error,
+    rms_movement,
+)
 from orchestrator.studies.validation.hidden import HiddenPart, hidden_voltages, with_hidden
 from orchestrator.studies.validation.parameters import NEVER, Adjustable, adjustable
 from orchestrator.studies.validation.residuals import LEAST_SCATTER, Report
@@ -35,6 +41,7 @@ _HELD_AFTER = (
     4.0  # part of an event after its begin in which the device is held in step [s]: a swing or two
 )
 _HELD_BEFORE = 0.5  # part before it, the same [s]
+_LITTLE = 0.05  # part of the plant's movement (rms) by which a model that is in step may be off
 _MOST_EVENTS = 3  # those with the largest errors
 _STEP = 0.02  # difference for a sensitivity, as part of a parameter's reach
 _WORSE = 1.2  # times the squared error: a position that leaves more at a first look is none
@@ -63,11 +70,20 @@ def explain_errors(
     error, causes are tried while the device is held in step. Of long recordings the first seconds of the events with
     the largest errors are looked at. Ctrl-C leaves the causes that were found until then."""
     found = _search(device, in_step or events, report)
-    if found.explains or not found.finished:
+    if found.explains or not found.finished or not _misses_much(device, events):
         return found
     short = [cut_event(one, _HELD_AFTER, _HELD_BEFORE) for one in events]
     other = _search(device.in_step, short, report, _plain_error(device, short))
     return replace(other if other.explains else found, finished=other.finished)
+
+
+def _misses_much(device: PlayedDevice, events: Sequence[RecordedEvent]) -> bool:
+    """Return whether some event's error is more than a little of what the plant moved: out of step it is all of it."""
+    for one in events:
+        error = np.hypot(*rms_error(device.play(one.recording, one.start).power, one))
+        if error > _LITTLE * np.hypot(*rms_movement(one)):
+            return True
+    return False
 
 
 def _plain_error(device: PlayedDevice, events: Sequence[RecordedEvent]) -> float:
@@ -89,7 +105,8 @@ def _search(
     finished = True
     try:
         for one in _causes(device, events, report):
-            found.append(replace(one, error=min(one.error, most)))
+            if not any(one.same_as(other) for other in found):
+                found.append(replace(one, error=min(one.error, most)))
     except KeyboardInterrupt:
         finished = False
     better = sorted((one for one in found if one.left < one.error), key=lambda one: one.left)

@@ -29,7 +29,8 @@ _WORSE = 3.0  # times that, by which the voltage is worse at explaining it
 def ask_of_setpoint(recording: Recording, windows: Windows, simulated: Complex) -> list[Question]:
     """P or Q that leaves the model's, at once or along a straight line, for good while the voltage does nothing.
 
-    An error that shrinks is the end of a transient, in which the model was off."""
+    An error that shrinks is the end of a transient, in which the model was off. Figure ``stop``: the end of the part
+    before, in which no mean over some time holds anything of the change [s]."""
     error = simulated - recording.power
     first = int(np.searchsorted(recording.times, windows.end + _WITHIN))
     found = []
@@ -55,7 +56,7 @@ def _steps(recording: Recording, name: str, values: Numbers, first: int) -> Iter
     around = recording.voltage[at : at + 2 * width]
     if abrupt and abs(offset) > _OFFSET and np.ptp(np.abs(around)) < _BACK:
         moment = recording.begin + float(recording.times[at + width])
-        figures = {"signal": name, "offset": -offset, "at": moment}
+        figures = {"signal": name, "offset": -offset, "at": moment, "stop": moment - _WITHIN}
         yield Question(QuestionKind.SETPOINT, figures)
 
 
@@ -96,7 +97,8 @@ def _ramps(recording: Recording, name: str, values: Numbers, first: int) -> Iter
     # the angle by itself, which is the sum of all that the frequency was off: a control that sums it up moves P so
     drifts = _error_beside(np.column_stack(columns), error) < _WORSE * rest
     begin, until = (recording.begin + float(one) for one in ends)
-    figures = {"signal": name, "offset": -float(size), "at": begin, "until": until}
+    stop = begin - max(_WITHIN, count * recording.interval)
+    figures = {"signal": name, "offset": -float(size), "at": begin, "until": until, "stop": stop}
     yield Question(QuestionKind.SETPOINT, figures | {"drifts": drifts})
 
 

@@ -19,6 +19,7 @@ from orchestrator.studies.validation.device import PlayedDevice, StartRefusedErr
 from orchestrator.studies.validation.event import (
     EventComparison,
     RecordedEvent,
+    before_setpoint,
     compare_with,
     in_step,
     prepare_event,
@@ -179,8 +180,8 @@ def _validate(request: ValidationRequest, report: Report) -> ValidationResult:
     others = _others(request, [one.event for one in comparisons], report)
     result = add_verdict(ValidationResult(request, comparisons, others=others))
     if request.explain:
-        events = [one.event for one in result.comparisons]
-        before = [in_step(one).event for one in result.comparisons]
+        events = [before_setpoint(one) for one in result.comparisons]
+        before = [before_setpoint(in_step(one)) for one in result.comparisons]
         search = explain_errors(request.device, events, report, before)
         result = replace(
             result,

@@ -263,19 +263,25 @@ def _setpoint(x: Figures) -> str:
         return (
             f"from {x['at']:.4g} to {x['until']:.4g} s {name} leaves the model's along a straight line, by "
             f"{x['offset']:+.3g} pu, while the angle of the voltage drifts: did a setpoint ramp, or did a control "
-            "beyond the plant (AGC) move it? No droop or gain explains it; give the part before, with "
-            + Option.STOP
+            "beyond the plant (AGC) move it? No droop or gain explains it. " + _before_setpoint(x)
         )
     if "until" in x:
         return (
             f"from {x['at']:.4g} to {x['until']:.4g} s {name} leaves the model's along a straight line, by "
             f"{x['offset']:+.3g} pu, which the voltage does not explain: did a setpoint ramp? No parameter explains "
-            "it; give the part before, with --stop"
+            "it. " + _before_setpoint(x)
         )
     return (
         f"at {x['at']:.4g} s {name} leaves the model's by {x['offset']:+.3g} pu and stays, and the "
-        "voltage does nothing then: did a setpoint change? No parameter explains it; give the part before, with --stop"
+        "voltage does nothing then: did a setpoint change? No parameter explains it. "
+        + _before_setpoint(x)
     )
+
+
+def _before_setpoint(x: Figures) -> str:
+    """The remedy: causes are looked for before a setpoint changed, and a fit is given that part."""
+    given = Option.STOP + f" {x['stop']:.4g}"
+    return Option.EXPLAIN + f" looks at the part before; give it to the rest as well, with {given}"
 
 
 def _out_of_step(x: Figures) -> str:
@@ -553,6 +559,12 @@ def _said_of_causes(explanations: Sequence[Explanation]) -> str:
         for one in explanations[1:]
         if one.name != best.name and one.explains and one.left < _ALIKE * best.left
     ]
+    if best.leaves_much:
+        times = f", {best.left / best.noise:.0f} times the scatter" if best.noise > 0 else ""
+        said += (
+            f" {best.left:.2g} pu (rms) are left{times}: something else may be off as well, and its part is in this "
+            "value; " + Option.FIT + " finds several values together."
+        )
     if alike:
         said += f" The recordings tell it hardly apart from {'; '.join(map(_cause, alike))}."
     return said

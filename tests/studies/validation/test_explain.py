@@ -1,10 +1,12 @@
 """A fault that is planted in the plant and not in its model is named, with its size, from the recording alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import orchestrator as gfor_in_python
-from orchestrator.studies.validation.causes import CauseKind
+from orchestrator.studies.validation.causes import CauseKind, Explanation
 from orchestrator.studies.validation.hidden import HiddenPart
 from orchestrator.studies.validation.words import explanation_sentence
 from tests.studies.validation.recordings import run, table, with_noise
@@ -98,3 +100,28 @@ def test_a_limit_of_the_current_that_is_too_high_in_the_model_is_named_with_the_
     assert (best.cause, best.name, best.now) == (CauseKind.VALUE, "current_limit.I_max", 1.2)
     assert best.value == pytest.approx(1.02, rel=0.001)
     assert best.share > 0.99
+
+
+def test_no_cause_is_read_from_what_follows_a_setpoint_that_changed():
+    """A right model, and a plant whose reference steps: a washout explained most of it, and was named."""
+    frame = with_noise(table(run("pod_p", stop=4.0)))
+    moved = frame.assign(p_mw=frame.p_mw + 75 * (frame.time > 2.5)).set_index("time")
+    found = gfor_in_python.validate("gfor", moved, values=ON, step=STEP, explain=True)
+    (question,) = [
+        one for one in found.as_json()["events"][0]["questions"] if one["kind"] == "setpoint"
+    ]
+    assert 2.2 < question["figures"]["stop"] < 2.5
+    assert all(one.error < 0.01 for one in found.result.explanations)  # 0.03 with what follows
+    assert "pod_p.T_W" not in [one.name for one in found.result.explanations if one.explains]
+
+
+def test_a_cause_beside_another_is_not_said_to_be_all():
+    """What one value leaves is counted in scatters of the recording; two ways to one value are one cause."""
+    alone = Explanation(CauseKind.VALUE, "pod_p.K", "pu", 200.0, 120.0, 0.04, 0.0009, noise=0.0006)
+    beside = replace(alone, value=110.0, left=0.0019)
+    assert not alone.leaves_much
+    assert beside.leaves_much
+    assert "something else may be off" not in explanation_sentence([alone])
+    assert "0.0019 pu (rms) are left, 3 times the scatter" in explanation_sentence([beside])
+    assert alone.same_as(replace(alone, left=0.001))
+    assert not alone.same_as(beside)
