@@ -14,26 +14,36 @@ Mask = NDArray[np.bool_]
 _FEWEST = 4  # repeated samples in a row
 _BESIDE = 10  # samples before and after that have to move
 _MOVING = 8  # so many of these
+_ROUNDING = (
+    1e-11  # of the largest value: what a simulation at rest moves by, and no recorder resolves
+)
 _BY_CHANCE = 0.01  # runs of a length that a coarse resolution may give in the whole recording
 
 
 def filled_samples(columns: Sequence[Numbers]) -> Mask:
     """Return which samples repeat the one before in all columns together, between samples that move.
 
-    A simulation at rest, and one that comes to rest, repeat samples as well: those do not move beside them. Of a coarse
-    resolution a run has to be longer than chance makes it."""
+    A simulation at rest, and one that comes to rest, repeat samples as well: those do not move beside them by more than
+    numbers are rounded. Of a coarse resolution a run has to be longer than chance makes it."""
     still = np.all([np.diff(values) == 0 for values in columns], axis=0)
+    moving = np.any([_moves(values) for values in columns], axis=0)
     found = np.zeros(len(still) + 1, dtype=bool)
     runs = list(runs_of(still))
     long = sum(high - low for low, high in runs if high - low >= _FEWEST)
     share = (int(still.sum()) - long) / max(len(still) - long, 1)
     for low, high in runs:
-        before, after = still[max(0, low - _BESIDE) : low], still[high : high + _BESIDE]
-        moves = min(int((~before).sum()), int((~after).sum())) >= _MOVING
+        before, after = moving[max(0, low - _BESIDE) : low], moving[high : high + _BESIDE]
+        moves = min(int(before.sum()), int(after.sum())) >= _MOVING
         chance = len(still) * share ** (high - low)
         if high - low >= _FEWEST and moves and chance < _BY_CHANCE:
             found[low + 1 : high + 1] = True
     return found
+
+
+def _moves(values: Numbers) -> Mask:
+    """Return which samples differ from the one before by more than numbers are rounded."""
+    largest = np.nanmax(np.abs(values), initial=0.0)
+    return np.asarray(~(np.abs(np.diff(values)) <= _ROUNDING * largest))
 
 
 def runs_of(mask: Mask) -> Iterator[tuple[int, int]]:
