@@ -18,6 +18,7 @@ Kind = Literal[
     "misfit",
     "trip",
     "stall",
+    "interruption",
     "bench_resonance",
 ]
 
@@ -46,6 +47,9 @@ LIMIT: Kind = "active_limit"
 
 STALL: Kind = "stall"
 """Kind of finding of a motor that stands still or nearly; what that does to the system, the others tell."""
+
+INTERRUPTION: Kind = "interruption"
+"""Kind of finding of a DC line that is blocked or bypassed; what that does to the system, the others tell."""
 
 # of a test bench whose own capacitance makes the oscillation: the response tells nothing of the device in a grid
 BENCH_RESONANCE: Kind = "bench_resonance"

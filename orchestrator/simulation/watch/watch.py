@@ -14,6 +14,7 @@ from orchestrator.core.errors import ComponentError, CosimError, NotFiniteError
 from orchestrator.devices.binding.misfits import Misfit
 from orchestrator.simulation.watch.confirmation import KnownModes
 from orchestrator.simulation.watch.finding import MISFIT, UNSTABLE, Finding, Kind
+from orchestrator.simulation.watch.interruptions import interruption_signals, interruptions
 from orchestrator.simulation.watch.limits import above_declared, active_limits, limit_signals
 from orchestrator.simulation.watch.own_trips import own_trip_signals, own_trips
 from orchestrator.simulation.watch.relay_trips import finding_of
@@ -141,6 +142,7 @@ class Watch:
                 *speed_signals(prepared.system),
                 *own_trip_signals(prepared.system),
                 *stall_signals(prepared.system),
+                *interruption_signals(prepared.system),
             ]
         )
         self._looks_at_records = every % prepared.record_every == 0 and not prepared.record_filtered
@@ -211,6 +213,7 @@ def judge_run(
     found = [
         *own_trips(seen, system, settings),
         *stalls(seen, system, settings),
+        *interruptions(seen, system),
         *undisturbed,
         *above_declared(seen, system),
         *active_limits(seen, system, settings),

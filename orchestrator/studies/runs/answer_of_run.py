@@ -10,7 +10,7 @@ from orchestrator.core.options import Option
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.output.report.short_texts import short
 from orchestrator.simulation.watch.confirmation import PERIODS
-from orchestrator.simulation.watch.finding import LIMIT, STALL, TRIP
+from orchestrator.simulation.watch.finding import INTERRUPTION, LIMIT, STALL, TRIP
 from orchestrator.simulation.watch.own_trips import OWN_TRIPS
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.runs.after_events import lasting_changes, same_mode
@@ -71,7 +71,7 @@ def _with_limits(answer: ScenarioAnswer, result: RunResult) -> ScenarioAnswer:
 
 
 def _with_trips(answer: ScenarioAnswer, result: RunResult) -> ScenarioAnswer:
-    """Return the answer with who was tripped or stalled, before all else that it remarks."""
+    """Return the answer with who was tripped, stalled or interrupted, before all else that it remarks."""
     by_relays = [f"{trip.relay.of} at {trip.time:.4g} s" for trip in result.trips]
     inside = [
         f"{one.component} at {one.time:.4g} s"
@@ -81,12 +81,18 @@ def _with_trips(answer: ScenarioAnswer, result: RunResult) -> ScenarioAnswer:
     stalled = [
         f"{one.component} at {one.time:.4g} s" for one in result.findings if one.kind == STALL
     ]
+    interrupted = [
+        f"{one.component} at {one.time:.4g} s"
+        for one in result.findings
+        if one.kind == INTERRUPTION
+    ]
     told = [
         f"{who} {few(list(dict.fromkeys(names)), _TRIPS_NAMED)}"
         for who, names in (
             ("relays trip", by_relays),
             ("own trips of", inside),
             ("motors that stall:", stalled),
+            ("DC lines that are blocked or bypassed:", interrupted),
         )
         if names
     ]

@@ -8,7 +8,7 @@ from orchestrator.cases.flow.sharing import SharingRule
 from orchestrator.cases.form.parameter_files import ParameterFile
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import CosimError, NotTakenUpError
-from orchestrator.simulation.watch.finding import STALL, TRIP, Finding, Kind
+from orchestrator.simulation.watch.finding import INTERRUPTION, STALL, TRIP, Finding, Kind
 from orchestrator.simulation.watch.own_trips import OWN_TRIPS
 from orchestrator.simulation.watch.relay_trips import finding_of, relays_in
 from orchestrator.simulation.watch.watch import Watch
@@ -144,6 +144,9 @@ def _outage_run(prepared: PreparedScenario) -> OutageRun:
     told = [_by_relay(trip) for trip in trips]
     told += [_inside(one) for one in findings if one.kind == TRIP and one.variable in OWN_TRIPS]
     told += [_inside(one) for one in findings if one.kind == STALL]
+    told += [
+        _inside(one) for one in findings if one.kind == INTERRUPTION and one.until is None
+    ]  # what comes back after a fault is as the control is meant
     wrong = [_gone_wrong(one) for one in findings if one.kind in DECIDING]
     return OutageRun(prepared.stop_time, tuple(told), tuple(wrong))
 

@@ -36,6 +36,7 @@ _KINDS = {
     "not_judged": "not judged",
     "trip": "a relay trips",
     "stall": "a motor stalls",
+    "interruption": "a DC line is interrupted",
     "not_finite": "not a number",
 }
 

@@ -122,6 +122,13 @@ def responses(gfor, tmp_path, *options):
     return xr.open_dataset(path)
 
 
+def interruptions_told(tmp_path):
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    (scenario,) = summary["scenarios"]
+    assert "DC lines that are blocked or bypassed: dc_TIE_1_5 at 1" in json.dumps(summary)
+    return [one for one in scenario["findings"] if one["kind"] == "interruption"]
+
+
 def test_it_starts_where_the_power_flow_is_with_the_lines_loss_between_its_ends(
     gfor, prepared, tmp_path
 ):
@@ -191,6 +198,11 @@ def test_a_fault_at_the_inverter_bypasses_it_and_it_comes_back(gfor, prepared, t
     assert np.diff(rising) == pytest.approx(5 * 250 * 0.04, rel=0.05)
     start = at(0.5, f"{INVERTER}.p")
     assert at(begin + 1.9, f"{INVERTER}.p") == pytest.approx(start, rel=0.01)
+    (told,) = interruptions_told(tmp_path)
+    assert told["variable"] == "bypassed"
+    assert begin <= told["time"] < begin + 0.02
+    assert begin + 0.1 < told["until"] < begin + 0.4
+    assert told["power_mw"] == pytest.approx(60)
 
 
 def test_a_fault_at_the_rectifier_blocks_it(gfor, prepared, tmp_path):
@@ -203,6 +215,7 @@ def test_a_fault_at_the_rectifier_blocks_it(gfor, prepared, tmp_path):
     current = run[f"{RECTIFIER}.I_dc"].to_numpy()
     assert current[np.argmin(np.abs(time - 1.05))] == 0
     assert current[-1] == pytest.approx(current[0], rel=0.01)
+    assert [told["variable"] for told in interruptions_told(tmp_path)] == ["blocked"]
 
 
 def test_left_out_it_is_a_load_at_each_bus(prepared):
