@@ -14,6 +14,7 @@ from orchestrator.studies.points.parts_done import parts_done
 EVERY = 30.0  # from one line to the next [s]: a log of a night has some hundred
 _MINUTE = 60.0  # [s]
 _IN_SECONDS = 2 * _MINUTE  # times below this are told in seconds [s]
+_IN_WHOLE_MINUTES = 10 * _MINUTE  # below this a line and the next would tell the same minute [s]
 
 
 class ProgressLines:
@@ -75,7 +76,10 @@ def progress_lines(console: Console, name: str, counted: str) -> ProgressLines:
 
 
 def _in_words(seconds: float) -> str:
-    return f"{seconds:.0f} s" if seconds < _IN_SECONDS else f"{seconds / _MINUTE:.0f} min"
+    if seconds < _IN_SECONDS:
+        return f"{seconds:.0f} s"
+    digits = 1 if seconds < _IN_WHOLE_MINUTES else 0
+    return f"{seconds / _MINUTE:.{digits}f} min"
 
 
 def both(one: Callable[[int, int], None], other: Callable[[int, int], None]) -> Callable[..., None]:

@@ -2,7 +2,7 @@
 
 import argparse
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -29,6 +29,7 @@ from orchestrator.face.cli import checkpoints, federates, run_request, terminal
 from orchestrator.face.cli.arguments import add_options, add_request_arguments, tolerance
 from orchestrator.face.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.face.cli.interrupted import is_interrupt, saying_how_it_goes_on
+from orchestrator.face.cli.progress_lines import progress_lines
 from orchestrator.face.cli.run_tables import print_run
 from orchestrator.face.cli.side_by_side import Outcome, Report, SideBySide, number_of_workers
 from orchestrator.face.cli.verdict import add_details_argument, add_verdict_argument, exit_code
@@ -191,24 +192,35 @@ def _outcomes(
     workers: int,
 ) -> Iterator[tuple[int, Outcome]]:
     """Return what came of all scenarios that were begun, in order, each with a bar meanwhile."""
-    bar, tasks = progress_bar(console), dict[int, Any]()
+    bar, tasks, steps = progress_bar(console), dict[int, Any](), dict[int, tuple[int, int]]()
+    lines = progress_lines(console, "run", "steps")
 
     def report(index: int, done: int, total: int) -> None:
+        steps[index] = done, total
+        lines.report(*_steps_of_all(steps.values(), len(scenarios)))
         if index not in tasks:
             tasks[index] = bar.add_task(scenarios[index].title, total=None)
         bar.update(tasks[index], completed=done, total=total or None)
 
     if workers > 1:
-        with SideBySide(workers, work) as copies, bar:
+        with SideBySide(workers, work) as copies, lines, bar:
             outcomes = copies.outcomes(len(scenarios), report)
         yield from outcomes
         return
-    with bar:
+    with lines, bar:
         for index in range(len(scenarios)):
             outcome = work(index, partial(report, index))
             yield index, outcome
             if isinstance(outcome, BaseException) or outcome.failure:
                 return
+
+
+def _steps_of_all(begun: Iterable[tuple[int, int]], number: int) -> tuple[int, int]:
+    """Return the steps done and those of all scenarios; one that has not begun is taken for as long as the longest."""
+    counts = list(begun)
+    totals = [total for _, total in counts if total]
+    waiting = number - len(totals)
+    return sum(done for done, _ in counts), sum(totals) + waiting * max(totals, default=0)
 
 
 def _say_unfinished(folder: Path) -> None:

@@ -58,6 +58,23 @@ def test_other_studies_say_it_on_standard_error_alone(often, tmp_path, capsys, n
     assert lines_of(out, name) == []
 
 
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_a_run_tells_how_many_steps_of_all_its_scenarios_are_done(often, tmp_path, capsys, workers):
+    scenarios = ["--scenario", "gfor", "--scenario", "pod_p"]
+    asked = ["two_area", *scenarios, "--stop", "0.4", "--workers", workers, "--json", "--no-csv"]
+    main(["run", *asked, "--out", str(tmp_path / "out")])
+    out, error = capsys.readouterr()
+    assert len(json.loads(out)) == 2
+    counts = [
+        (int(found[1]), int(found[2]))
+        for line in lines_of(error, "run")
+        if (found := re.match(r"run: (\d+) of (\d+) steps", line))
+    ]
+    assert counts == sorted(counts)
+    assert {total for _, total in counts} == {8000}  # two of 0.4 s at 100 µs
+    assert "steps, " not in out
+
+
 def test_what_was_there_already_does_not_make_the_time_left_short(monkeypatch):
     now = [100.0]
     monkeypatch.setattr(progress_lines, "monotonic", lambda: now[0])
@@ -68,7 +85,9 @@ def test_what_was_there_already_does_not_make_the_time_left_short(monkeypatch):
     assert lines.line() == "sweep: 6 of 10 points, 60 s"
     lines.report(8, 10)
     assert lines.line() == "sweep: 8 of 10 points, 60 s, about 60 s left"
-    now[0] += 600.0
+    now[0] += 90.0
+    assert lines.line() == "sweep: 8 of 10 points, 2.5 min, about 2.5 min left"
+    now[0] += 510.0
     assert lines.line() == "sweep: 8 of 10 points, 11 min, about 11 min left"
 
 
