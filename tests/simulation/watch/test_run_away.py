@@ -245,6 +245,8 @@ def test_what_runs_away_is_looked_for_from_the_start_on(events, begins, monkeypa
         "above_declared",
         "active_limits",
         "own_trips",
+        "stalls",
+        "interruptions",
     ):
         monkeypatch.setattr(watch, name, lambda *_: ())
     monkeypatch.setattr(watch, "resting_signals", lambda *_: ())

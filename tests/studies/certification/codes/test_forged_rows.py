@@ -34,6 +34,7 @@ from orchestrator.studies.certification.files import (
     seal_of,
 )
 from orchestrator.studies.certification.request import CertificationRequest
+from orchestrator.studies.certification.verdict import verdicts_on_page
 from orchestrator.studies.certification.verification import read_certificate, verify_files
 from tests.support.bindings import GFOR
 from tests.support.grid_codes import replace_code
@@ -84,9 +85,10 @@ def sealed(folder, content):
     """Make the page's mark and all hashes fit."""
     page = folder / HTML
     old = json.loads((folder / JSON).read_text(encoding="utf-8"))
-    text = page.read_text(encoding="utf-8").replace(
-        escape(old["sentence"]), escape(content["sentence"])
-    )
+    text = page.read_text(encoding="utf-8")
+    said, says = (verdicts_on_page(one["sentence"]) for one in (old, content))
+    for former, now in zip(said, says, strict=True):
+        text = text.replace(escape(former), escape(now))
     page.write_text(text.replace(figures_hash(old), figures_hash(content)), encoding="utf-8")
     content["files"] = {name: file_hash(folder / name) for name in content["files"]}
     content["seal"] = seal_of(content)

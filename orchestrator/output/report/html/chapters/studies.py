@@ -9,6 +9,7 @@ import xarray as xr
 
 from orchestrator.cases.questions.idle_values import DAMPING_CONTROLLERS
 from orchestrator.core.errors import few, number_of
+from orchestrator.core.options import Option
 from orchestrator.core.truth import all_true
 from orchestrator.output.report.colours import colour
 from orchestrator.output.report.html import studies
@@ -50,7 +51,9 @@ def of_screening(file: Path, c: Content) -> Chapter:
     counted = c["counted_at_all_frequencies"]
     if not isinstance(counted, bool) and counted < computed:
         lost.append(
-            f"growth outside of the range at {computed - counted} of {computed} cases: --whole counts it"
+            f"growth outside of the range at {computed - counted} of {computed} cases: "
+            + Option.WHOLE
+            + " counts it"
         )
     return Chapter(
         file,
@@ -80,7 +83,8 @@ def of_site(file: Path, c: Content) -> Chapter:
     terminals = c.get("terminals_left_out", ())
     lost = [*c.get("open_points", ())]
     if terminals:
-        lost.append(f"the terminals of units, {few(terminals, _SHOWN)}: --buses 'bus_*' takes them")
+        named = few(terminals, _SHOWN)
+        lost.append(f"the terminals of units, {named}: " + Option.BUSES + " 'bus_*' takes them")
     return Chapter(
         file,
         "Where does a converter help most?",
