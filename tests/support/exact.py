@@ -45,7 +45,7 @@ def _parts(prepared: PreparedScenario, network: Network | None) -> dict:
         model = (
             written_out(build_model("grid", network=network))
             if own
-            else _of_catalogue(plan.description.model_name)
+            else _of_catalogue(build_model, plan.description.model_name)
         )
         p = np.array([float(plan.parameters.get(v.name, v.start)) for v in model.parameters])
         c, x = model.initialise(p)
@@ -54,9 +54,11 @@ def _parts(prepared: PreparedScenario, network: Network | None) -> dict:
 
 
 @cache
-def _of_catalogue(name: str) -> Model:
-    """A model as functions of (x, u, p, c) alone; its equations are differentiated once, at whatever point they are."""
-    return written_out(build_model(name))
+def _of_catalogue(build: Callable[[str], Model], name: str) -> Model:
+    """A model as functions of (x, u, p, c) alone; its equations are differentiated once, at whatever point they are.
+
+    ``build``: a test may have models of its own built."""
+    return written_out(build(name))
 
 
 @lru_cache(maxsize=16)  # models: those of the catalogue in a file of tests, and some networks

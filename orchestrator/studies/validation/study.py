@@ -14,7 +14,7 @@ from orchestrator.core.options import Option
 from orchestrator.core.threads import one_thread
 from orchestrator.studies.validation.beside import WindowApart, models_apart
 from orchestrator.studies.validation.between import with_doubt_between
-from orchestrator.studies.validation.causes import Explanation
+from orchestrator.studies.validation.causes import CauseSearch, Explanation
 from orchestrator.studies.validation.device import PlayedDevice, StartRefusedError
 from orchestrator.studies.validation.event import (
     EventComparison,
@@ -180,9 +180,7 @@ def _validate(request: ValidationRequest, report: Report) -> ValidationResult:
     others = _others(request, [one.event for one in comparisons], report)
     result = add_verdict(ValidationResult(request, comparisons, others=others))
     if request.explain:
-        events = [before_setpoint(one) for one in result.comparisons]
-        before = [before_setpoint(in_step(one)) for one in result.comparisons]
-        search = explain_errors(request.device, events, report, before)
+        search = _search_causes(request.device, result.comparisons, report)
         result = replace(
             result,
             explanations=search.causes,
@@ -190,6 +188,26 @@ def _validate(request: ValidationRequest, report: Report) -> ValidationResult:
             interrupted=not search.finished,
         )
     return _with_fit(result, report) if request.fit and not result.interrupted else result
+
+
+def _search_causes(
+    device: PlayedDevice, comparisons: Sequence[EventComparison], report: Report
+) -> CauseSearch:
+    """Search for causes in what comes before a setpoint that seems to have changed, and then in the whole.
+
+    What one parameter explains to the recording's scatter was no setpoint: a limit of the current that acts from a
+    moment on looks like one at first."""
+    before = [before_setpoint(one) for one in comparisons]
+    found = explain_errors(
+        device, before, report, [before_setpoint(in_step(one)) for one in comparisons]
+    )
+    whole = [one.event for one in comparisons]
+    same = all(one is other for one, other in zip(before, whole, strict=True))
+    if found.explains or not found.finished or same:
+        return found
+    other = explain_errors(device, whole, report, [in_step(one).event for one in comparisons])
+    taken = other if other.explains and not other.causes[0].leaves_much else found
+    return replace(taken, finished=other.finished)
 
 
 def _with_fit(result: ValidationResult, report: Report) -> ValidationResult:

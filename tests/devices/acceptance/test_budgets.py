@@ -32,9 +32,9 @@ def test_a_slow_answer_takes_nothing_away_from_what_is_seen(gallery, monkeypatch
     quick = check_fmu(*gallery("matching"), Limits(seconds=6.0), ASKED, run_for=0.5)
     usual = process.FmuProcess.run
 
-    def late(self, *given):
+    def late(self, *given, **named):
         begin = time.perf_counter()
-        found = usual(self, *given)
+        found = usual(self, *given, **named)
         time.sleep(2 * (time.perf_counter() - begin))
         return found
 
