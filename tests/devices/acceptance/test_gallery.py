@@ -214,8 +214,9 @@ def test_an_angle_that_turns_back_by_less_than_a_turn_is_told(tmp_path):
 
 
 def test_a_swing_that_is_the_same_everywhere_is_not_uneven(tmp_path):
+    """Of one draw in some hundred a remark tells a jump: its swing goes on while the frequency is moved on."""
     path = build(converter("swings", UNDAMPED_WHERE=1), tmp_path)
-    assert check_fmu(path, None, LIMITS, ("evenness",), run_for=0.3).results[-1].verdict == "pass"
+    assert check_fmu(path, None, LIMITS, ("evenness",), run_for=0.3).faults == []
 
 
 def test_a_sign_that_turns_with_larger_changes_of_the_frequency_is_found(tmp_path):
