@@ -12,7 +12,6 @@ _INTERRUPTED = {"blocked": "is blocked", "bypassed": "is bypassed at its inverte
 """Outputs that a DC line's control has, by what each says above 0.5."""
 
 _HOLDS = 0.5
-_DECIMALS = 4  # of the time of a look [s]
 
 
 def _controls_a_line(plan: ComponentPlan) -> bool:
@@ -35,9 +34,9 @@ def interruptions(seen: Seen, system: System) -> Iterator[Finding]:
             acting = np.flatnonzero(seen.values[f"{name}.{variable}"] > _HOLDS)
             if not len(acting):
                 continue
-            begin = round(float(seen.times[acting[0]]), _DECIMALS)
+            begin = seen.moment(acting[0])
             last = int(acting[-1]) + 1
-            until = round(float(seen.times[last]), _DECIMALS) if last < len(seen.times) else None
+            until = seen.moment(last) if last < len(seen.times) else None
             ends = "to the end" if until is None else f"until t = {until:.6g} s"
             message = (
                 f"the DC line of {name} {what} from t = {begin:.6g} s {ends}: it carried "

@@ -21,7 +21,6 @@ OWN_TRIPS = frozenset((LATCH, SHARE))
 
 _DECIDED = 0.5  # value of a latch from which it holds
 _WHOLE = 0.99  # share below which a part is off: the lag of the share ends far above
-_DECIMALS = 4  # of the time of a look [s]
 
 
 def _watched(plan: ComponentPlan) -> str | None:
@@ -50,7 +49,7 @@ def own_trips(seen: Seen, system: System, settings: Settings) -> Iterator[Findin
         off = off & (settings.connected(name) > 0)
         if not off.any():
             continue
-        begin = round(float(seen.times[np.flatnonzero(off)[0]]), _DECIMALS)
+        begin = seen.moment(np.flatnonzero(off)[0])
         if variable == LATCH:
             yield _of_motor(name, plan, begin, power)
         else:

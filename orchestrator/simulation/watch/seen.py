@@ -25,6 +25,9 @@ _STILL = 0.2  # part of the current by which a slip moves it at least
 _SETTLED = 1e-4  # distance of omega from its rest [pu] at which a meter has settled
 
 
+_DECIMALS = 4  # of the time of a look [s]
+
+
 @dataclass(frozen=True)
 class Seen:
     times: Numbers  # of the looks [s], shape (n,)
@@ -46,6 +49,10 @@ class Seen:
         return Seen(
             self.times[:count], *({name: y[:count] for name, y in part.items()} for part in parts)
         )
+
+    def moment(self, look: int) -> float:
+        """Return the time of a look [s], as it is told."""
+        return round(float(self.times[look]), _DECIMALS)
 
     @property
     def interval(self) -> float:

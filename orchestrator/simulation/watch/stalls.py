@@ -19,7 +19,6 @@ _STALLED = 0.5
 0.3."""
 
 _HOLDS = 0.5  # value of a relay's latch from which it holds
-_DECIMALS = 4  # of the time of a look [s]
 
 
 def _is_motor(plan: ComponentPlan) -> bool:
@@ -43,7 +42,7 @@ def stalls(seen: Seen, system: System, settings: Settings) -> Iterator[Finding]:
         is_off = settings.connected(name)[-1] <= 0 or (latch is not None and latch[-1] > _HOLDS)
         if is_off or speed[-1] >= _STALLED or speed[0] < _STALLED:
             continue
-        begin = round(float(seen.times[np.flatnonzero(speed >= _STALLED)[-1] + 1]), _DECIMALS)
+        begin = seen.moment(np.flatnonzero(speed >= _STALLED)[-1] + 1)
         power = abs(plan.number("P_0") * plan.number("S_n"))
         message = (
             f"{name} stalls: its speed falls below {_STALLED:g} pu at t = {begin:.6g} s and is {speed[-1]:.3g} pu at "

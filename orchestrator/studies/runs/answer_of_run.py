@@ -1,6 +1,6 @@
 """The answer of a run: what it showed, beside the eigenvalues before its events and after them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil
@@ -10,7 +10,7 @@ from orchestrator.core.options import Option
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.output.report.short_texts import short
 from orchestrator.simulation.watch.confirmation import PERIODS
-from orchestrator.simulation.watch.finding import INTERRUPTION, LIMIT, STALL, TRIP
+from orchestrator.simulation.watch.finding import INTERRUPTION, LIMIT, STALL, TRIP, Finding, Kind
 from orchestrator.simulation.watch.own_trips import OWN_TRIPS
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.runs.after_events import lasting_changes, same_mode
@@ -73,32 +73,31 @@ def _with_limits(answer: ScenarioAnswer, result: RunResult) -> ScenarioAnswer:
 def _with_trips(answer: ScenarioAnswer, result: RunResult) -> ScenarioAnswer:
     """Return the answer with who was tripped, stalled or interrupted, before all else that it remarks."""
     by_relays = [f"{trip.relay.of} at {trip.time:.4g} s" for trip in result.trips]
-    inside = [
-        f"{one.component} at {one.time:.4g} s"
-        for one in result.findings
-        if one.kind == TRIP and one.variable in OWN_TRIPS
-    ]
-    stalled = [
-        f"{one.component} at {one.time:.4g} s" for one in result.findings if one.kind == STALL
-    ]
-    interrupted = [
-        f"{one.component} at {one.time:.4g} s"
-        for one in result.findings
-        if one.kind == INTERRUPTION
-    ]
+    inside = [one for one in _of_kind(result, TRIP) if one.variable in OWN_TRIPS]
     told = [
         f"{who} {few(list(dict.fromkeys(names)), _TRIPS_NAMED)}"
         for who, names in (
             ("relays trip", by_relays),
-            ("own trips of", inside),
-            ("motors that stall:", stalled),
-            ("DC lines that are blocked or bypassed:", interrupted),
+            ("own trips of", _who_and_when(inside)),
+            ("motors that stall:", _who_and_when(_of_kind(result, STALL))),
+            (
+                "DC lines that are blocked or bypassed:",
+                _who_and_when(_of_kind(result, INTERRUPTION)),
+            ),
         )
         if names
     ]
     if not told:
         return answer
     return replace(answer, remark=short("; ".join([*told, answer.remark]), LONGEST_REMARK))
+
+
+def _of_kind(result: RunResult, kind: Kind) -> list[Finding]:
+    return [one for one in result.findings if one.kind == kind]
+
+
+def _who_and_when(findings: Sequence[Finding]) -> list[str]:
+    return [f"{one.component} at {one.time:.4g} s" for one in findings]
 
 
 def _of_run(result: RunResult) -> ScenarioAnswer:

@@ -197,15 +197,14 @@ def _search_causes(
 
     What one parameter explains to the recording's scatter was no setpoint: a limit of the current that acts from a
     moment on looks like one at first."""
+    kept = [in_step(one) for one in comparisons]
     before = [before_setpoint(one) for one in comparisons]
-    found = explain_errors(
-        device, before, report, [before_setpoint(in_step(one)) for one in comparisons]
-    )
+    found = explain_errors(device, before, report, [before_setpoint(one) for one in kept])
     whole = [one.event for one in comparisons]
     same = all(one is other for one, other in zip(before, whole, strict=True))
     if found.explains or not found.finished or same:
         return found
-    other = explain_errors(device, whole, report, [in_step(one).event for one in comparisons])
+    other = explain_errors(device, whole, report, [one.event for one in kept])
     taken = other if other.explains and not other.causes[0].leaves_much else found
     return replace(taken, finished=other.finished)
 
