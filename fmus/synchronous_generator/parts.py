@@ -27,7 +27,7 @@ from fmus.synchronous_generator.excitation.without_regulator import external, ma
 from fmus.synchronous_generator.limiters.common import Limiter, Limiters
 from fmus.synchronous_generator.limiters.oel2c import oel2c
 from fmus.synchronous_generator.limiters.overexcitation import maxex1, maxex2
-from fmus.synchronous_generator.limiters.uel2c import uel2c
+from fmus.synchronous_generator.limiters.uel2c import uel2, uel2c
 from fmus.synchronous_generator.limiters.underexcitation import mnlex2, uel1
 from fmus.synchronous_generator.machine import FluxDeclaration, Machine
 from fmus.synchronous_generator.machines.classical import classical
@@ -155,7 +155,13 @@ OELS: dict[str, Limiter | None] = {
     "maxex2": maxex2,
     "oel2c": oel2c,
 }
-UELS: dict[str, Limiter | None] = {NONE: None, "mnlex2": mnlex2, "uel1": uel1, "uel2c": uel2c}
+UELS: dict[str, Limiter | None] = {
+    NONE: None,
+    "mnlex2": mnlex2,
+    "uel1": uel1,
+    "uel2": uel2,
+    "uel2c": uel2c,
+}
 """Limiters of over- and of underexcitation."""
 
 WITH_POD = {"_pod": False, "_pod_input": True}

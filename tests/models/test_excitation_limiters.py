@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.signal
 
 from fmus.synchronous_generator.composed import synchronous_generator, synchronous_generator_phasor
 from fmus.synchronous_generator.parts import EXCITERS, OELS, UELS
@@ -293,25 +294,62 @@ POLYGON |= {
     f"{name}{k}": 9.0 * sign for k in "12" for name, sign in (("V_UELMAX", 1), ("V_UELMIN", -1))
 }
 POLYGON |= {"V_ULMIN": -9.0, "V_ULMAX": 9.0}
+POLYGON_OF = {
+    "uel2c": POLYGON,
+    "uel2": {name: value for name, value in POLYGON.items() if "UEL" not in name},
+}
 
 
-def signal_of_uel2c(P, Q, **values):
-    alone = limiter(POLYGON | values, uel=UELS["uel2c"])
+def signal_of_uel2c(P, Q, name="uel2c", **values):
+    alone = limiter(POLYGON_OF[name] | values, uel=UELS[name])
     assert not refused(alone)
     i = np.conj((P + 1j * Q) / V_T)
     found, _ = integrated(alone, lambda t: [E_FD, E_FD, i.real, i.imag], 3.0)
     return found[-1]["v_s"]
 
 
+@pytest.mark.parametrize("name", ["uel2c", "uel2"])
 @pytest.mark.parametrize(
     ("P", "edge"),
     [(0.0, -0.31), (0.15, -0.31), (0.45, -0.295), (0.9, -0.21), (0.96, -0.105), (1.08, 0.105)],
 )
-def test_uel2c_lifts_what_lies_below_its_polygon(P, edge):
+def test_uel2c_and_uel2_lift_what_lies_below_their_polygon(P, edge, name):
     """K_UL·(Q_ref − Q)/K_fix, with points as far as P rises and straight on beyond the last one."""
-    bare = {"k_1": 0.0, "k_2": 0.0, "K_fix": 0.5}
-    assert signal_of_uel2c(P, -0.5, **bare) == pytest.approx(2 * (edge + 0.5) / 0.5, abs=1e-4)
-    assert signal_of_uel2c(-P, -0.5, **bare) == pytest.approx(2 * (edge + 0.5) / 0.5, abs=1e-4)
+    bare = {"k_1": 0.0, "k_2": 0.0} | ({"K_fix": 0.5} if name == "uel2c" else {"K_UL": 4.0})
+    lifted = pytest.approx(2 * (edge + 0.5) / 0.5, abs=1e-4)
+    assert signal_of_uel2c(P, -0.5, name, **bare) == lifted
+    assert signal_of_uel2c(-P, -0.5, name, **bare) == lifted
+
+
+@pytest.mark.parametrize(("k_1", "k_2"), [(2, 2), (1, 0), (0, 1)])
+def test_uel2_scales_its_polygon_with_the_voltage(k_1, k_2):
+    P = 0.45
+    edge = np.interp(P / V_T**k_1, [0.3, 0.6], [-0.31, -0.28]) * V_T**k_2
+    scaled = signal_of_uel2c(P, -0.4, "uel2", k_1=float(k_1), k_2=float(k_2))
+    assert scaled == pytest.approx(2 * (edge + 0.4), abs=1e-4)
+
+
+def test_uel2_follows_a_step_as_its_blocks_do():
+    """Lag of the reactive power, K_UL, two leads and lags, the sum within V_UIMAX: SciPy's response of the same."""
+    times = {"T_UQ": 0.1, "T_U1": 0.3, "T_U2": 0.5, "T_U3": 0.04, "T_U4": 0.2}
+    plain = {"k_1": 0.0, "k_2": 0.0, "K_UL": 0.8, "V_UIMIN": 0.0, "V_ULMIN": 0.0}
+    alone = limiter(POLYGON_OF["uel2"] | plain | times, uel=UELS["uel2"])
+    inside, below = (np.conj((0.15 + 1j * Q) / V_T) for Q in (-0.31, -0.5))
+    at_rest, x = integrated(alone, lambda t: [E_FD, E_FD, inside.real, inside.imag], 5.0)
+    assert at_rest[-1]["v_s"] == pytest.approx(0.0, abs=1e-5)
+    found, _ = integrated(alone, lambda t: [E_FD, E_FD, below.real, below.imag], 1.0, x=x)
+    poles = [np.array([times[name], 1.0]) for name in ("T_UQ", "T_U2", "T_U4")]
+    zeros = [np.array([times[name], 1.0]) for name in ("T_U1", "T_U3")]
+    numerator, denominator = 0.8 * 0.19 * np.polymul(*zeros), np.polymul(*poles[:2])
+    t = np.arange(len(found) + 1) * 1e-3
+    _, wanted = scipy.signal.step((numerator, np.polymul(denominator, poles[2])), T=t)
+    got = np.array([each["v_s"] for each in found])
+    assert got == pytest.approx(wanted[1:], abs=1e-6)
+    capped = limiter(
+        POLYGON_OF["uel2"] | plain | times | {"V_UIMAX": 0.1, "V_ULMAX": 0.08}, uel=UELS["uel2"]
+    )
+    found, _ = integrated(capped, lambda t: [E_FD, E_FD, below.real, below.imag], 4.0)
+    assert found[-1]["v_s"] == pytest.approx(0.08, abs=1e-6)
 
 
 def test_uel2c_scales_its_polygon_with_the_voltage_and_its_gain_with_the_angle():

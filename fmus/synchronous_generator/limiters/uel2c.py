@@ -1,4 +1,4 @@
-"""UEL2C (IEEE 421.5-2016): a limiter of underexcitation with a polygon in the plane of active and reactive power.
+"""UEL2C (IEEE 421.5-2016) and UEL2 (2005): underexcitation below a polygon in the plane of active and reactive power.
 
     v/(1+sT_UV) → u       u = v above 1; 1 down to V_bias; v/V_bias below; v for V_bias < 0
     Q_ref = u^k_2·F(P/u^k_1 through 1/(1+sT_UP)), through 1/(1+sT_Qref)
@@ -8,15 +8,19 @@
 
 F goes through the points (P0, Q0) to (P10, Q10), as far as P rises, and straight on beyond both ends; M = 0 has it
 even in P. K is K_fix, or with SW = 2 (v²/X_q + Q)/|v²/X_q + Q + jP| through 1/(1+sT_adj). The inputs K_UF and K_FB of
-the exciter's feedback are left out. Sources: IEEE 421.5-2016; the order of the fields and what the flags do as InterPSS
-has them (`Uel2cData`, `Uel2cUnderExcitationLimiter`), which it holds against PSS/E."""
+the exciter's feedback are left out. UEL2 has the voltage for u, Q_ref at once, K = 1, and no limits between the stages.
+Sources: IEEE 421.5-2016; the order of the fields and what the flags do as InterPSS
+has them (`Uel2cData`, `Uel2cUnderExcitationLimiter`), which it holds against PSS/E. UEL2's equations are those of
+OPAL-RT's ephasorsim-modelica-library at cba975b (`UEL2`), the order of its fields too, as PowerWorld's guide has it."""
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 from fmus.synchronous_generator.data_lines import Given, declared, number, power, seconds
 from fmus.synchronous_generator.excitation.common import Regulated
 from fmus.synchronous_generator.limiters.common import Limited, rate_within_limits
 from fmus.toolchain.blocks import BYPASS_TIME, clamp, lead_lag, low_pass_or_nothing
+from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, fabs, fmax, if_else, logic_and
 
@@ -67,44 +71,86 @@ UEL2C = (
     power("V_UELMIN1", 0.0, "Lower limit behind the second stage"),
     number("X_q", 1.8, "Synchronous reactance of the adjustable gain", 0.01),
 )
+_OF_2016 = ("SW", "V_bias", "K_fix", "T_adj", "T_Qref", "X_q")
+_LIMITS_OF_2016 = ("V_UELMAX2", "V_UELMIN2", "V_UELMAX1", "V_UELMIN1")
+UEL2 = tuple(line for line in UEL2C if line.name not in (*_OF_2016, *_LIMITS_OF_2016))
 _SOURCE = "a usual capability"
 
 
+def uel2(m: ModelBuilder, seen: Regulated) -> Limited:
+    """Declare UEL2 (IEEE 421.5-2005) and return its signal to the voltage regulator [pu]."""
+    p = declared(m, UEL2, _SOURCE)
+    at = _Terminal.seen_by(seen)
+    v = low_pass_or_nothing(m, "voltage", at.v, p.T_UV, at.v_0)
+    bias, bias_0 = (fmax(size, _LEAST_BIAS) for size in (v, at.v_0))
+    least, least_0 = _scaled_edge(m, p, at, (bias, bias_0))
+    Q = low_pass_or_nothing(m, "reactive", Expr(at.S.im), p.T_UQ, at.S_0.im)
+    controlled, controlled_0 = _controlled(m, p, least - Q, least_0 - at.S_0.im)
+    first = lead_lag(m, "lead_lag_1", controlled, p.T_U1, p.T_U2, controlled_0)
+    second = lead_lag(m, "lead_lag_2", first, p.T_U3, p.T_U4, controlled_0)
+    signal, at_start = (clamp(x, p.V_ULMIN, p.V_ULMAX) for x in (second, controlled_0))
+    return Limited(signal, at_start, lambda E_fd: None, fmax(p.V_UIMIN, p.V_ULMIN))
+
+
 def uel2c(m: ModelBuilder, seen: Regulated) -> Limited:
-    """Declare the limiter and return its signal to the voltage regulator [pu]."""
+    """Declare UEL2C and return its signal to the voltage regulator [pu]."""
     p = declared(m, UEL2C, _SOURCE)
-    v, S = seen.terminal(seen.I_fd), seen.terminal(seen.I_fd) * seen.i.conjugate()
-    v_0, S_0 = seen.v_0.magnitude(), seen.v_0 * seen.start.i.conjugate()
-    u_0 = _bias(p, v_0)
-    u = _bias(p, low_pass_or_nothing(m, "voltage", v.magnitude(), p.T_UV, v_0))
-    P_0 = S_0.re / _raised(u_0, p.k_1)
-    P = low_pass_or_nothing(m, "active", S.re / _raised(u, p.k_1), p.T_UP, P_0)
-    least_0 = _edge(p, Expr(P_0)) * _raised(u_0, p.k_2)
-    least = low_pass_or_nothing(m, "reference", _edge(p, P) * _raised(u, p.k_2), p.T_Qref, least_0)
-    Q = low_pass_or_nothing(m, "reactive", Expr(S.im), p.T_UQ, S_0.im)
-    gain_0 = _gain(p, v_0, Expr(S_0.re), Expr(S_0.im))
-    adjusted = _gain(p, v.magnitude(), Expr(S.re), Expr(S.im))
+    at = _Terminal.seen_by(seen)
+    u_0 = _bias(p, at.v_0)
+    u = _bias(p, low_pass_or_nothing(m, "voltage", at.v, p.T_UV, at.v_0))
+    wanted, least_0 = _scaled_edge(m, p, at, (u, u_0))
+    least = low_pass_or_nothing(m, "reference", wanted, p.T_Qref, least_0)
+    Q = low_pass_or_nothing(m, "reactive", Expr(at.S.im), p.T_UQ, at.S_0.im)
+    gain_0 = _gain(p, at.v_0, Expr(at.S_0.re), Expr(at.S_0.im))
+    adjusted = _gain(p, at.v, Expr(at.S.re), Expr(at.S.im))
     gain = low_pass_or_nothing(m, "gain", adjusted, p.T_adj, gain_0)
-    e, e_0 = (least - Q) / gain, (least_0 - S_0.im) / gain_0
-
-    integrates = p.K_UI > 0
-    x_0 = if_else(integrates, p.V_UIMIN, 0)
-    x = m.state("integrator", x_0, "pu", "Integral of the excess", base="S_n")
-    within = rate_within_limits(x, p.K_UI * e, p.V_UIMIN, p.V_UIMAX)
-    m.derivative(x, if_else(integrates, within, -x / BYPASS_TIME))
-
-    def controlled(excess: Expr, integral: Expr) -> Expr:
-        return clamp(p.K_UL * excess + integral, p.V_UIMIN, p.V_UIMAX)
-
-    first_0 = clamp(controlled(e_0, x_0), p.V_UELMIN2, p.V_UELMAX2)
+    controlled, controlled_0 = _controlled(m, p, (least - Q) / gain, (least_0 - at.S_0.im) / gain_0)
+    first_0 = clamp(controlled_0, p.V_UELMIN2, p.V_UELMAX2)
     second_0 = clamp(first_0, p.V_UELMIN1, p.V_UELMAX1)
-    staged = lead_lag(m, "lead_lag_1", controlled(e, x), p.T_U1, p.T_U2, controlled(e_0, x_0))
+    staged = lead_lag(m, "lead_lag_1", controlled, p.T_U1, p.T_U2, controlled_0)
     first = clamp(staged, p.V_UELMIN2, p.V_UELMAX2)
     staged = lead_lag(m, "lead_lag_2", first, p.T_U3, p.T_U4, first_0)
     second = clamp(staged, p.V_UELMIN1, p.V_UELMAX1)
     lowest = fmax(fmax(p.V_UIMIN, p.V_UELMIN2), fmax(p.V_UELMIN1, p.V_ULMIN))
     signal, at_start = (clamp(x, p.V_ULMIN, p.V_ULMAX) for x in (second, second_0))
     return Limited(signal, at_start, lambda E_fd: None, lowest)
+
+
+@dataclass(frozen=True)
+class _Terminal:
+    """Voltage [pu] and power [pu, S_n] at the terminal, now and at the start."""
+
+    v: Expr
+    S: Phasor
+    v_0: Expr
+    S_0: Phasor
+
+    @classmethod
+    def seen_by(cls, seen: Regulated) -> "_Terminal":
+        v = seen.terminal(seen.I_fd)
+        S, S_0 = v * seen.i.conjugate(), seen.v_0 * seen.start.i.conjugate()
+        return cls(v.magnitude(), S, seen.v_0.magnitude(), S_0)
+
+
+def _scaled_edge(
+    m: ModelBuilder, p: Given, at: _Terminal, biases: tuple[Expr, Expr]
+) -> tuple[Expr, Expr]:
+    """The least reactive power [pu, S_n] by the voltage's bias, now and at the start."""
+    bias, bias_0 = biases
+    P_0 = at.S_0.re / _raised(bias_0, p.k_1)
+    P = low_pass_or_nothing(m, "active", at.S.re / _raised(bias, p.k_1), p.T_UP, P_0)
+    return _edge(p, P) * _raised(bias, p.k_2), _edge(p, Expr(P_0)) * _raised(bias_0, p.k_2)
+
+
+def _controlled(m: ModelBuilder, p: Given, excess: Expr, excess_0: Expr) -> tuple[Expr, Expr]:
+    """The excess through K_UL + K_UI/s, now and at the start; the integral rests at its lower limit."""
+    integrates = p.K_UI > 0
+    x_0 = if_else(integrates, p.V_UIMIN, 0)
+    x = m.state("integrator", x_0, "pu", "Integral of the excess", base="S_n")
+    within = rate_within_limits(x, p.K_UI * excess, p.V_UIMIN, p.V_UIMAX)
+    m.derivative(x, if_else(integrates, within, -x / BYPASS_TIME))
+    now, start = (p.K_UL * e + integral for e, integral in ((excess, x), (excess_0, x_0)))
+    return clamp(now, p.V_UIMIN, p.V_UIMAX), clamp(start, p.V_UIMIN, p.V_UIMAX)
 
 
 def _bias(p: Given, v: Expr) -> Expr:

@@ -60,23 +60,43 @@ def test_a_limiter_is_a_part_with_its_fields_in_the_files_order(tmp_path):
 
 POINTS = "-0.2 0.01 0.2 0.02 0.6 0.03 1 0.04" + 14 * " 0"
 UEL2C = (
-    f"1 'UEL2C' 1 2 2 1 2 0.02 0.03 0.025 0.4 0.8 0.5 -0.2 {{kuf}} 0 0.08 0.02 0.07 0.015 0.06 {POINTS} "
+    f"{{begin}} 2 2 1 2 0.02 0.03 0.025 0.4 0.8 0.5 -0.2 {{kuf}} 0 0.08 0.02 0.07 0.015 0.06 {POINTS} "
     "0.6 -0.3 0.95 0.9 0.1 0.04 0.55 -0.25 0.5 -0.2 0.6 /\n"
 )
 """Constants of UEL2C as a test of InterPSS has them (`Uel2cLimiterTest`)."""
 
 
-def test_uel2c_has_its_fields_in_the_order_of_interpss(tmp_path):
-    model, _, _ = read(tmp_path, GENROU + SEXS + UEL2C.format(kuf=0))
+@pytest.mark.parametrize("begin", ["1 'UEL2C' 1", "1 'USRMDL' 1 'UEL2CU1' 9 0 4 47 9 2"])
+def test_uel2c_has_its_fields_in_the_order_of_interpss(begin, tmp_path):
+    model, _, asked = read(tmp_path, GENROU + SEXS + UEL2C.format(begin=begin, kuf=0))
+    assert asked == []
     own = {n.removeprefix("uel."): x for n, x in model.parameters.items() if n.startswith("uel.")}
     assert model.parts["uel"] == "uel2c"
-    begin = {"k_1": 2, "k_2": 2, "M": 1, "SW": 2, "T_UV": 0.02, "K_UI": 0.4, "K_UL": 0.8}
+    first = {"k_1": 2, "k_2": 2, "M": 1, "SW": 2, "T_UV": 0.02, "K_UI": 0.4, "K_UL": 0.8}
     points = {"P0": -0.2, "Q0": 0.01, "P3": 1, "Q3": 0.04, "P4": 0, "Q10": 0, "T_U4": 0.06}
     end = {"V_ULMAX": 0.6, "V_ULMIN": -0.3, "V_bias": 0.95, "K_fix": 0.9, "X_q": 0.6}
-    wanted = begin | points | end | {"V_UELMAX2": 0.55, "V_UELMIN1": -0.2, "T_Qref": 0.04}
+    wanted = first | points | end | {"V_UELMAX2": 0.55, "V_UELMIN1": -0.2, "T_Qref": 0.04}
     assert {name: own[name] for name in wanted} == wanted
-    model, _, _ = read(tmp_path, GENROU + SEXS + UEL2C.format(kuf=0.1))
-    assert any("UEL2C has KUF = 0.1" in doubt.text for doubt in model.doubts)
+    model, _, _ = read(tmp_path, GENROU + SEXS + UEL2C.format(begin=begin, kuf=0.1))
+    assert any("has KUF = 0.1" in doubt.text for doubt in model.doubts)
+
+
+UEL2 = (
+    f"1 'UEL2' 1 2 1 1 0.02 0.03 0.025 0.4 0.8 0.5 -0.2 0 {{kfb}} 0.08 0.02 0.07 0.015 0.06 {POINTS} "
+    "0.6 -0.3 /\n"
+)
+
+
+def test_uel2_has_pss_e_icons_first_and_then_uel2c_s_fields(tmp_path):
+    model, _, asked = read(tmp_path, GENROU + SEXS + UEL2.format(kfb=0))
+    own = {n.removeprefix("uel."): x for n, x in model.parameters.items() if n.startswith("uel.")}
+    assert model.parts["uel"] == "uel2"
+    wanted = {"k_1": 2, "k_2": 1, "M": 1, "T_UV": 0.02, "T_UP": 0.03, "K_UI": 0.4, "K_UL": 0.8}
+    wanted |= {"T_U1": 0.02, "T_U4": 0.06, "P0": -0.2, "Q3": 0.04, "V_ULMAX": 0.6, "V_ULMIN": -0.3}
+    assert {name: own[name] for name in wanted} == wanted
+    assert asked == []
+    model, _, _ = read(tmp_path, GENROU + SEXS + UEL2.format(kfb=0.3))
+    assert any("UEL2 has KFB = 0.3" in doubt.text for doubt in model.doubts)
 
 
 OEL2C = (
