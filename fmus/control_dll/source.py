@@ -1,9 +1,10 @@
 """The C source of a model as IEEE/CIGRE DLL: its kernel, what it declares, and the interface's functions."""
 
+from collections.abc import Iterable, Sequence
 from importlib.metadata import version as version_of
 from pathlib import Path
 
-from fmus.toolchain.c_text import c_number, c_string
+from fmus.toolchain.c_text import c_array, c_number, c_string
 from fmus.toolchain.kernel import c_source
 from fmus.toolchain.model import Model
 from fmus.toolchain.variables import Input, Output, Parameter
@@ -35,49 +36,62 @@ def c_name(name: str) -> str:
     return name.replace(".", "_")
 
 
-def _declarations(model: Model, sample_time: float) -> str:
-    parameters = model.parameters
-    for group in (parameters, model.inputs, model.outputs):
+def _check_names(model: Model) -> None:
+    """Refuse names that are one and the same name in C."""
+    for group in (model.parameters, model.inputs, model.outputs):
         names = [c_name(variable.name) for variable in group]
         twice = [name for name in names if names.count(name) > 1]
         if twice:
             raise ValueError(
                 f"model {model.name}: two variables would be called {twice[0]!r} in the DLL"
             )
-    members = "".join(
-        f" {'double' if p.type == 'Real' else 'int32_t'} {c_name(p.name)};" for p in parameters
-    )
-    rows = {
-        "AT": ("size_t", [f"offsetof(struct parameters, {c_name(p.name)})" for p in parameters]),
-        "WHOLE": ("char", [str(int(p.type != "Real")) for p in parameters]),
-        "FIXED": ("char", [str(int(not p.tunable)) for p in parameters]),
-        "LEAST": ("double", [c_number(_bounds(p)[0]) for p in parameters]),
-        "MOST": ("double", [c_number(_bounds(p)[1]) for p in parameters]),
-    }
-    numbers = [
-        f"static const {kind} {name}[] = {{{', '.join(row)}}};"
-        for name, (kind, row) in rows.items()
-    ]
+
+
+def _declarations(model: Model, sample_time: float) -> str:
+    _check_names(model)
     lines = [
         f"enum {{ NR = {len(model.requirement_texts)}, INTERNAL_STEP = {model.value_references['internal_step']} }};",
         f"static const double SAMPLE_TIME = {sample_time!r};",
-        f"struct parameters {{{members} }};",
-        *numbers,
+        *_parameter_arrays(model.parameters),
         *_texts(model),
-        _table("dll_signal", "INPUTS", [_signal(v) for v in model.inputs]),
-        _table("dll_signal", "OUTPUTS", [_signal(v) for v in model.outputs]),
-        _table("dll_parameter", "PARAMETERS", [_parameter(p) for p in parameters]),
+        _table("dll_signal", "INPUTS", map(_signal, model.inputs)),
+        _table("dll_signal", "OUTPUTS", map(_signal, model.outputs)),
+        _table("dll_parameter", "PARAMETERS", map(_parameter, model.parameters)),
         _info(model, sample_time),
     ]
     return "\n".join(lines)
 
 
+def _parameter_arrays(parameters: Sequence[Parameter]) -> list[str]:
+    """The structure of the parameters, and arrays that say where each is in it and what it may be."""
+    members = ""
+    at, whole, fixed, least, most = [], [], [], [], []
+    for p in parameters:
+        lower, upper = _bounds(p)
+        members += f" {'double' if p.type == 'Real' else 'int32_t'} {c_name(p.name)};"
+        at.append(f"offsetof(struct parameters, {c_name(p.name)})")
+        whole.append(str(int(p.type != "Real")))
+        fixed.append(str(int(not p.tunable)))
+        least.append(c_number(lower))
+        most.append(c_number(upper))
+    return [
+        f"struct parameters {{{members} }};",
+        c_array("size_t", "AT", at),
+        c_array("char", "WHOLE", whole),
+        c_array("char", "FIXED", fixed),
+        c_array("double", "LEAST", least),
+        c_array("double", "MOST", most),
+    ]
+
+
 def _texts(model: Model) -> list[str]:
     """Every text of an error: whole ones, so that the DLL needs no memory to write one."""
-    name = model.name
 
-    def row(kind: str, texts: list[str]) -> str:
-        return f"static const char *const {kind}[] = {{{', '.join(c_string(f'{name}: {t}') for t in texts) or '0'}}};"
+    def line(text: str) -> str:
+        return c_string(f"{model.name}: {text}")
+
+    def lines(name: str, texts: Iterable[str]) -> str:
+        return c_array("char *const", name, map(line, texts))
 
     bounds = [
         f"parameter {c_name(p.name)} must be from {_bounds(p)[0]:g} to {_bounds(p)[1]:g}"
@@ -90,22 +104,17 @@ def _texts(model: Model) -> list[str]:
         "NO_START": "the operating point gives no finite state; check the parameters",
         "FIXED_CHANGED": f"a fixed parameter was changed after Model_Initialize; these may change: {free}",
     }
+    rules = [f"parameters cannot be used: {rule}" for rule in model.requirement_texts]
+    inputs = [f"input {c_name(v.name)} is not a finite number" for v in model.inputs]
+    states = [f"state {v.name} is no longer finite: the solution diverges" for v in model.states]
+    title = f"{model.name}, gfor-cosim {_version()}: {model.title}"
     return [
-        row("OUT_OF_BOUNDS", bounds),
-        row("RULE", [f"parameters cannot be used: {rule}" for rule in model.requirement_texts]),
-        row(
-            "INPUT_NOT_FINITE",
-            [f"input {c_name(v.name)} is not a finite number" for v in model.inputs],
-        ),
-        row(
-            "STATE_NOT_FINITE",
-            [f"state {v.name} is no longer finite: the solution diverges" for v in model.states],
-        ),
-        *(
-            f"static const char {key}[] = {c_string(f'{name}: {text}')};"
-            for key, text in single.items()
-        ),
-        f"static const char TITLE[] = {c_string(f'{name}, gfor-cosim {_version()}: {model.title}')};",
+        lines("OUT_OF_BOUNDS", bounds),
+        lines("RULE", rules),
+        lines("INPUT_NOT_FINITE", inputs),
+        lines("STATE_NOT_FINITE", states),
+        *(f"static const char {key}[] = {line(text)};" for key, text in single.items()),
+        f"static const char TITLE[] = {c_string(title)};",
     ]
 
 
@@ -122,8 +131,8 @@ def _bounds(p: Parameter) -> tuple[float, float]:
     )
 
 
-def _table(kind: str, name: str, rows: list[str]) -> str:
-    return f"static const struct {kind} {name}[] = {{{', '.join(rows)}}};"
+def _table(kind: str, name: str, rows: Iterable[str]) -> str:
+    return c_array(f"struct {kind}", name, rows, empty="")
 
 
 def _signal(v: Input | Output) -> str:

@@ -1,5 +1,7 @@
 """Text of C: literals, and the identity that every native FMU begins with."""
 
+from collections.abc import Iterable
+
 
 def identity_source(guid: str, digest: str) -> str:
     """The text before the source: the FMU's identity. The digest [hex] also marks the states that the FMU saves."""
@@ -13,6 +15,11 @@ def c_string(text: str) -> str:
         chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in text.encode()
     )
     return f'"{plain}"'
+
+
+def c_array(kind: str, name: str, entries: Iterable[str], empty: str = "0") -> str:
+    """A constant array in C; ``empty`` is its entry where it has none, because C knows no empty array."""
+    return f"static const {kind} {name}[] = {{{', '.join(entries) or empty}}};"
 
 
 def c_number(value: float | None, missing: str = "0") -> str:

@@ -5,6 +5,7 @@ A quantity is declared where it is used, and the equations read like the block d
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import TypeVar
 
 from fmus.toolchain.model import Integrator, Model
 from fmus.toolchain.nodal_equations import Complex, Nodes
@@ -29,6 +30,8 @@ from fmus.toolchain.variables import (
     Variable,
     VariableType,
 )
+
+_Kind = TypeVar("_Kind", bound=Variable)
 
 
 class ModelBuilder:
@@ -242,35 +245,27 @@ class ModelBuilder:
 
         Raises a `ValueError` if a state has no derivative, or a calculated parameter or initial state depends on
         something other than parameters."""
-        kinds: dict[type, list[tuple[Variable, Expr]]] = {
-            kind: [entry for entry in self._declared.values() if type(entry[0]) is kind]
-            for kind in (Parameter, CalculatedParameter, Input, State, Output)
-        }
-        p, c, u, x, _ = ([declared for _, declared in entries] for entries in kinds.values())
+        parameters, p = self._declared_as(Parameter)
+        calculated, c = self._declared_as(CalculatedParameter)
+        inputs, u = self._declared_as(Input)
+        states, x = self._declared_as(State)
+        outputs, _ = self._declared_as(Output)
         algebraic = self._closed_signals()
         self._check_origins(p)
-        missing = [s.name for s, _ in kinds[State] if s.name not in self._derivatives]
+        missing = [s.name for s in states if s.name not in self._derivatives]
         if missing:
             raise ValueError(f"model {self.name}: no derivative is given for {', '.join(missing)}")
-        if integrator == "sdirk" and any(
-            isinstance(v, State) and v.stepwise for v, _ in kinds[State]
-        ):
-            raise ValueError(
-                f"model {self.name}: the implicit integrator knows no stepwise states; take runge_kutta"
-            )
-        if integrator == "sdirk" and self._nodes is not None:
-            raise ValueError(
-                f"model {self.name}: the implicit integrator solves no nodal equations; take runge_kutta"
-            )
+        if integrator == "sdirk":
+            self._check_for_sdirk(states)
 
-        def collect(entries: list[tuple[Variable, Expr]], values: dict[str, Expr]) -> list[Expr]:
-            found = [values[variable.name] for variable, _ in entries]
+        def collect(variables: Sequence[Variable], values: dict[str, Expr]) -> list[Expr]:
+            found = [values[variable.name] for variable in variables]
             for signal, value in algebraic:
                 found = substitute(found, [signal], [value])
             return found
 
-        c_value = self._calculate(kinds[CalculatedParameter], c)
-        x_value = substitute(collect(kinds[State], self._expressions), c, c_value)
+        c_value = self._calculate(calculated, c)
+        x_value = substitute(collect(states, self._expressions), c, c_value)
         r_value = [value for value, _ in self._requirements]
         arguments = [x, u, p, c]
         nodal = None
@@ -279,23 +274,19 @@ class ModelBuilder:
             arguments.append(self._nodes.symbols)
         implicit = None
         if self._implicit:
-            rates = collect(kinds[State], self._derivatives | self._implicit)
+            rates = collect(states, self._derivatives | self._implicit)
             implicit = Function("implicit", arguments, [rates])
         return Model(
             name=self.name,
             title=self.title,
-            parameters=tuple(v for v, _ in kinds[Parameter]),  # type: ignore[misc]
-            calculated=tuple(v for v, _ in kinds[CalculatedParameter]),  # type: ignore[misc]
-            inputs=tuple(v for v, _ in kinds[Input]),  # type: ignore[misc]
-            states=tuple(v for v, _ in kinds[State]),  # type: ignore[misc]
-            outputs=tuple(v for v, _ in kinds[Output]),  # type: ignore[misc]
+            parameters=parameters,
+            calculated=calculated,
+            inputs=inputs,
+            states=states,
+            outputs=outputs,
             initialise=Function("initialise", [p], [c_value, x_value]),
-            derivatives=Function(
-                "derivatives", arguments, [collect(kinds[State], self._derivatives)]
-            ),
-            outputs_function=Function(
-                "outputs", arguments, [collect(kinds[Output], self._expressions)]
-            ),
+            derivatives=Function("derivatives", arguments, [collect(states, self._derivatives)]),
+            outputs_function=Function("outputs", arguments, [collect(outputs, self._expressions)]),
             requirements=Function("requirements", [p, c], [r_value]),
             requirement_texts=tuple(text for _, text in self._requirements),
             integrator=integrator,
@@ -304,11 +295,29 @@ class ModelBuilder:
             kind=self.kind,
         )
 
-    def _calculate(self, entries: list[tuple[Variable, Expr]], c: list[Expr]) -> list[Expr]:
+    def _declared_as(self, kind: type[_Kind]) -> tuple[tuple[_Kind, ...], list[Expr]]:
+        """The variables of one kind, and their symbols or expressions."""
+        entries = [(v, symbol) for v, symbol in self._declared.values() if type(v) is kind]
+        return tuple(v for v, _ in entries), [symbol for _, symbol in entries]
+
+    def _check_for_sdirk(self, states: Sequence[State]) -> None:
+        """Refuse parts of a model that the implicit integrator cannot solve."""
+        if any(state.stepwise for state in states):
+            raise ValueError(
+                f"model {self.name}: the implicit integrator knows no stepwise states; take runge_kutta"
+            )
+        if self._nodes is not None:
+            raise ValueError(
+                f"model {self.name}: the implicit integrator solves no nodal equations; take runge_kutta"
+            )
+
+    def _calculate(
+        self, calculated: Sequence[CalculatedParameter], c: Sequence[Expr]
+    ) -> list[Expr]:
         """Express every calculated parameter by parameters alone; each may use those declared before it."""
         tunable = [s for v, s in self._declared.values() if isinstance(v, Parameter) and v.tunable]
         values: list[Expr] = []
-        for index, (variable, _) in enumerate(entries):
+        for index, variable in enumerate(calculated):
             (value,) = substitute([self._expressions[variable.name]], c[:index], values)
             if depends_on([value], tunable):
                 raise ValueError(

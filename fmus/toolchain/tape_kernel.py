@@ -48,24 +48,36 @@ def power(a, b):
         return nan if a < 0.0 else inf
 
 
-def as_in_c(function, overflow):
+def log(a):
+    return -inf if a == 0.0 else _log(a)
+
+
+def as_in_c(function, undefined):
+    """Let a function give ``undefined`` where Python's own raises an error."""
+
     def evaluate(a):
         try:
             return function(a)
         except (ValueError, OverflowError):
-            return overflow(a)
+            return undefined
 
     return evaluate
 
 
+_log = as_in_c(math.log, nan)
 NAMES = {
     "divide": divide,
     "power": power,
-    "sqrt": as_in_c(math.sqrt, lambda a: nan),
-    "log": as_in_c(math.log, lambda a: -inf if a == 0.0 else nan),
-    "exp": as_in_c(math.exp, lambda a: inf),
-    **{f.__name__: as_in_c(f, lambda a: nan) for f in (math.sin, math.cos, math.tan)},
-    **{f.__name__: f for f in (math.atan2, math.copysign, math.fabs, math.floor)},
+    "sqrt": as_in_c(math.sqrt, nan),
+    "log": log,
+    "exp": as_in_c(math.exp, inf),
+    "sin": as_in_c(math.sin, nan),
+    "cos": as_in_c(math.cos, nan),
+    "tan": as_in_c(math.tan, nan),
+    "atan2": math.atan2,
+    "copysign": math.copysign,
+    "fabs": math.fabs,
+    "floor": math.floor,
 }
 FORMS = (
     *(

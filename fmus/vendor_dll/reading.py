@@ -6,7 +6,7 @@ a third word, values of text parameters as JSON, the DLL is tried."""
 import ctypes as c
 import json
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -94,19 +94,25 @@ def read_interface(library: Library) -> DllInterface:
             raise ValueError(
                 f"Model_GetInfo tells {getattr(info, name)} {name[2:]}; its structure is of another layout"
             )
+    inputs = rows(_Signal, info.inputs, info.n_inputs)
+    outputs = rows(_Signal, info.outputs, info.n_outputs)
+    parameters = rows(_Parameter, info.parameters, info.n_parameters)
+    calls = tuple(name for name in CALLS if library.has(f"Model_{name}"))
     return DllInterface(
         texts={name: text(getattr(info, name)) for name in TEXTS},
         interface_version=tuple(info.interface_version),
         sample_time=info.sample_time,
         mode=info.mode,
-        inputs=tuple(_signal(row, text) for row in rows(_Signal, info.inputs, info.n_inputs)),
-        outputs=tuple(_signal(row, text) for row in rows(_Signal, info.outputs, info.n_outputs)),
-        parameters=tuple(
-            _parameter(row, text) for row in rows(_Parameter, info.parameters, info.n_parameters)
-        ),
+        inputs=_signals(inputs, text),
+        outputs=_signals(outputs, text),
+        parameters=tuple(_parameter(row, text) for row in parameters),
         states=(info.int_states, info.float_states, info.double_states),
-        calls=tuple(name for name in CALLS if library.has(f"Model_{name}")),
+        calls=calls,
     )
+
+
+def _signals(rows: Iterable[_Signal], text: _Text) -> tuple[Signal, ...]:
+    return tuple(_signal(row, text) for row in rows)
 
 
 def _signal(row: _Signal, text: _Text) -> Signal:

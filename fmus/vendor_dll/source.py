@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from fmus.toolchain.c_text import c_number, c_string
+from fmus.toolchain.c_text import c_array, c_number, c_string
 from fmus.toolchain.kernel import c_source
 from fmus.toolchain.model import Model
 from fmus.toolchain.variables import Input, Parameter, State, Variable
@@ -69,7 +69,7 @@ def circuit_source(model: Model, device: Device) -> str:
     lines = [
         f"enum {{ {at}, {', '.join(f'{name} = {value}' for name, value in flags.items())} }};",
         *(f"static const double {name} = {c_number(value)};" for name, value in numbers.items()),
-        f"static const char *const RULE[] = {{{', '.join(map(c_string, model.requirement_texts)) or '0'}}};",
+        c_array("char *const", "RULE", map(c_string, model.requirement_texts)),
         "struct route { int type; size_t offset; int place, base; double factor; };",
         f"static const struct route MEASURED[] = {{{_routes(device.measured, model)}}};",
         f"static const struct route DRIVEN[] = {{{_routes(device.driven, model)}}};",
@@ -273,6 +273,10 @@ def _numbers(rows: Sequence[DllParameter] | Sequence[Signal]) -> list[Place]:
     return [place for place in layout(rows).places if place.type.kind != "String"]
 
 
+def _strings(rows: Sequence[DllParameter] | Sequence[Signal]) -> list[Place]:
+    return [place for place in layout(rows).places if place.type.kind == "String"]
+
+
 def _variable(
     place: Place,
     name: str,
@@ -330,40 +334,31 @@ def _tables(
     vendor_file: str,
     variables: Sequence[HostVariable],
 ) -> list[str]:
-    regions = trial.regions
-    sizes = {
-        name: layout(rows).size
-        for name, rows in (
-            ("IN_SIZE", interface.inputs),
-            ("OUT_SIZE", interface.outputs),
-            ("PAR_SIZE", interface.parameters),
-        )
-    }
-    words = [place for place in layout(interface.parameters).places if place.type.kind == "String"]
-    text_inputs = [
-        place for place in layout(interface.inputs).places if place.type.kind == "String"
-    ]
-    numbers = sizes | dict(zip(("INTS", "FLOATS", "DOUBLES"), interface.states, strict=True))
-    numbers |= {
+    texts_of_parameters = _strings(interface.parameters)
+    text_inputs = _strings(interface.inputs)
+    ints, floats, doubles = interface.states
+    numbers = {
+        "IN_SIZE": layout(interface.inputs).size,
+        "OUT_SIZE": layout(interface.outputs).size,
+        "PAR_SIZE": layout(interface.parameters).size,
+        "INTS": ints,
+        "FLOATS": floats,
+        "DOUBLES": doubles,
         "NV": len(variables),
-        "TEXTS": len(words),
+        "TEXTS": len(texts_of_parameters),
         "TEXT_INPUTS": len(text_inputs),
-        "REGIONS": len(regions),
+        "REGIONS": len(trial.regions),
+        "OWN_STATE": int(trial.state == "library"),
+        "MEMORY": sum(size for _, size in trial.regions),
+        "MODE": 2 if interface.mode == 2 else 1,
     }
-    numbers |= {"OWN_STATE": int(trial.state == "library")}
-    numbers |= {"MEMORY": sum(size for _, size in regions), "MODE": 2 if interface.mode == 2 else 1}
-    values = [
-        f"{{{c_string(v.name)}, {v.kind.upper()}, {v.role}, {v.data_type}, {v.offset}, {c_number(v.start)}, "
-        f"{c_number(v.parameter.minimum if v.parameter else None, '-INFINITY')}, "
-        f"{c_number(v.parameter.maximum if v.parameter else None, 'INFINITY')}, "
-        f"{int(v.parameter is not None and not v.fixed)}}}"
-        for v in variables
-    ]
-    given = [
+    words = [
         texts.get(place.name, str(place.row.default))
-        for place in words
+        for place in texts_of_parameters
         if isinstance(place.row, DllParameter)
     ]
+    carried_flags = [str(int(place.name in carried)) for place in texts_of_parameters]
+    regions = [f"{{{start}, {size}}}" for start, size in trial.regions]
     return [
         "enum { " + ", ".join(f"{name} = {value}" for name, value in numbers.items()) + " };",
         "enum kind { REAL, INTEGER, BOOLEAN };",
@@ -372,12 +367,28 @@ def _tables(
         f"static const char VENDOR_FILE[] = {c_string(vendor_file)};",
         "struct variable { const char *name; int kind, role, type; size_t offset; "
         "double start, minimum, maximum; int tunable; };",
-        f"static const struct variable VARIABLE[] = {{{', '.join(values)}}};",
-        f"static const size_t TEXT_AT[] = {{{', '.join(str(place.offset) for place in words) or '0'}}};",
-        f"static const char *const WORDS[] = {{{', '.join(map(c_string, given)) or '0'}}};",
-        f"static const char *const NAMES[] = {{{', '.join(c_string(place.name) for place in words) or '0'}}};",
-        f"static const char CARRIED[] = {{{', '.join(str(int(place.name in carried)) for place in words) or '0'}}};",
-        f"static const size_t TEXT_INPUT_AT[] = {{{', '.join(str(place.offset) for place in text_inputs) or '0'}}};",
+        c_array("struct variable", "VARIABLE", map(_row, variables)),
+        _offsets("TEXT_AT", texts_of_parameters),
+        c_array("char *const", "WORDS", map(c_string, words)),
+        c_array("char *const", "NAMES", [c_string(place.name) for place in texts_of_parameters]),
+        c_array("char", "CARRIED", carried_flags),
+        _offsets("TEXT_INPUT_AT", text_inputs),
         'static const char *const EMPTY = "";',
-        f"static const size_t REGION[][2] = {{{', '.join(f'{{{a}, {b}}}' for a, b in regions) or '{0, 0}'}}};",
+        f"static const size_t REGION[][2] = {{{', '.join(regions) or '{0, 0}'}}};",
     ]
+
+
+def _row(v: HostVariable) -> str:
+    """A variable as an entry of the host's array."""
+    least = c_number(v.parameter.minimum if v.parameter else None, "-INFINITY")
+    most = c_number(v.parameter.maximum if v.parameter else None, "INFINITY")
+    tunable = int(v.parameter is not None and not v.fixed)
+    return (
+        f"{{{c_string(v.name)}, {v.kind.upper()}, {v.role}, {v.data_type}, {v.offset}, {c_number(v.start)}, "
+        f"{least}, {most}, {tunable}}}"
+    )
+
+
+def _offsets(name: str, places: Sequence[Place]) -> str:
+    """The array of where places lie in their structure [bytes]."""
+    return c_array("size_t", name, [str(place.offset) for place in places])

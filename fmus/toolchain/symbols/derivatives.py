@@ -3,7 +3,7 @@
 Partial derivatives are written, and summed, in the way of CasADi, and so to the same bit. A Jacobian is made column by
 column; CasADi goes by rows where these are far fewer, and sums otherwise there."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from fmus.toolchain.symbols.expression import MINUS_ONE, ONE, TWO, ZERO, Expr, Scalar, operation
 from fmus.toolchain.symbols.function import Vector, sorted_nodes
@@ -68,50 +68,69 @@ def _moves_of(values: Vector, symbols: Mapping[Expr, dict[int, Expr]]) -> list[d
 
 def _partials(f: Expr) -> _Partials:
     """Derivatives of an operation by its first and by its second operand; none of comparisons, logic, floor."""
-    by_two = _BY_TWO.get(f.op)
-    if by_two is not None:
-        return by_two(f, f.a, f.b)
-    return _BY_ONE[f.op](f, f.a) if f.op in _BY_ONE else ZERO, ZERO
+    if f.op in UNARY:
+        return _partial_by_one(f, f.a), ZERO
+    return _partials_by_two(f, f.a, f.b)
 
 
-def _of_power(f: Expr, x: Expr, y: Expr) -> _Partials:
-    return y * x ** (y - 1), log(x) * f if f.op == Op.POW else ZERO
+def _partial_by_one(f: Expr, x: Expr) -> Expr:
+    """Derivative of a function of one operand."""
+    match f.op:
+        case Op.NEG:
+            return MINUS_ONE
+        case Op.TWICE:
+            return TWO
+        case Op.SQ:
+            return x + x
+        case Op.INV:
+            return -f * f
+        case Op.SQRT:
+            return 1 / (f + f)
+        case Op.EXP:
+            return f
+        case Op.LOG:
+            return 1 / x
+        case Op.SIN:
+            return cos(x)
+        case Op.COS:
+            return -sin(x)
+        case Op.TAN:
+            return 1 / sq(cos(x))
+        case Op.ATAN:
+            return 1 / (1 + x * x)
+        case Op.FABS:
+            return sign(x)
+    return ZERO
 
 
-def _of_extreme(f: Expr, x: Expr, y: Expr) -> _Partials:
-    first, second = (x <= y, y <= x) if f.op == Op.FMIN else (y <= x, x <= y)
+def _partials_by_two(f: Expr, x: Expr, y: Expr) -> _Partials:
+    """Derivatives of a function of two operands."""
+    match f.op:
+        case Op.ADD:
+            return ONE, ONE
+        case Op.SUB:
+            return ONE, MINUS_ONE
+        case Op.MUL:
+            return y, x
+        case Op.DIV:
+            return 1 / y, -f / y
+        case Op.POW:
+            return y * x ** (y - 1), log(x) * f
+        case Op.CONSTPOW:
+            return y * x ** (y - 1), ZERO
+        case Op.FMIN:
+            return _partials_of_extreme(x <= y, y <= x)
+        case Op.FMAX:
+            return _partials_of_extreme(y <= x, x <= y)
+        case Op.ATAN2:
+            length = x * x + y * y
+            return y / length, -x / length
+        case Op.COPYSIGN:
+            return sign(x) * copysign(1, y), ZERO
+    return ZERO, ZERO
+
+
+def _partials_of_extreme(first: Expr, second: Expr) -> _Partials:
+    """Derivatives of the operand that is the extreme one; of two equal ones, half each."""
     both = first + second
     return first / both, second / both
-
-
-def _of_angle(_: Expr, x: Expr, y: Expr) -> _Partials:
-    length = x * x + y * y
-    return y / length, -x / length
-
-
-_BY_ONE: dict[int, Callable[[Expr, Expr], Expr]] = {
-    Op.NEG: lambda f, x: MINUS_ONE,
-    Op.TWICE: lambda f, x: TWO,
-    Op.SQ: lambda f, x: x + x,
-    Op.INV: lambda f, x: -f * f,
-    Op.SQRT: lambda f, x: 1 / (f + f),
-    Op.EXP: lambda f, x: f,
-    Op.LOG: lambda f, x: 1 / x,
-    Op.SIN: lambda f, x: cos(x),
-    Op.COS: lambda f, x: -sin(x),
-    Op.TAN: lambda f, x: 1 / sq(cos(x)),
-    Op.ATAN: lambda f, x: 1 / (1 + x * x),
-    Op.FABS: lambda f, x: sign(x),
-}
-_BY_TWO: dict[int, Callable[[Expr, Expr, Expr], _Partials]] = {
-    Op.ADD: lambda f, x, y: (ONE, ONE),
-    Op.SUB: lambda f, x, y: (ONE, MINUS_ONE),
-    Op.MUL: lambda f, x, y: (y, x),
-    Op.DIV: lambda f, x, y: (1 / y, -f / y),
-    Op.POW: _of_power,
-    Op.CONSTPOW: _of_power,
-    Op.FMIN: _of_extreme,
-    Op.FMAX: _of_extreme,
-    Op.ATAN2: _of_angle,
-    Op.COPYSIGN: lambda f, x, y: (sign(x) * copysign(1, y), ZERO),
-}

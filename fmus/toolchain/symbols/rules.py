@@ -183,6 +183,38 @@ def _nonnegative(x: Expr) -> bool:
     return x.value >= 0 if x.op == Op.CONST else x.op in _NONNEGATIVE
 
 
+def _neg(x: Expr, _: Expr) -> Expr:
+    return -x
+
+
+def _lt(x: Expr, y: Expr) -> Expr:
+    return ZERO if _nonnegative(_sub(x, y)) else node(Op.LT, x, y)
+
+
+def _le(x: Expr, y: Expr) -> Expr:
+    return ONE if _nonnegative(_sub(y, x)) else node(Op.LE, x, y)
+
+
+def _eq(x: Expr, y: Expr) -> Expr:
+    return ONE if _same(x, y) else node(Op.EQ, x, y)
+
+
+def _ne(x: Expr, y: Expr) -> Expr:
+    return ZERO if _same(x, y) else node(Op.NE, x, y)
+
+
+def _absolute(x: Expr, _: Expr) -> Expr:
+    return fabs(x.a) if x.op == Op.NEG else node(Op.FABS, x, x)
+
+
+def _root(x: Expr, _: Expr) -> Expr:
+    return fabs(x.a) if x.op == Op.SQ else node(Op.SQRT, x, x)
+
+
+def _cosine(x: Expr, _: Expr) -> Expr:
+    return cos(x.a) if x.op in (Op.NEG, Op.FABS) else node(Op.COS, x, x)
+
+
 def _undone(op: int, by: int) -> Callable[[Expr, Expr], Expr]:
     """An operation that undoes another one."""
     return lambda x, _: x.a if x.op == by else node(op, x, x)
@@ -211,17 +243,17 @@ RULES |= {
     Op.TWICE: _twice,
     Op.SQ: _squared,
     Op.IF_ELSE_ZERO: _if_else_zero,
-    Op.NEG: lambda x, _: -x,
+    Op.NEG: _neg,
     Op.INV: _undone(Op.INV, Op.INV),
     Op.LOG: _undone(Op.LOG, Op.EXP),
     Op.NOT: _undone(Op.NOT, Op.NOT),
-    Op.LT: lambda x, y: ZERO if _nonnegative(_sub(x, y)) else node(Op.LT, x, y),
-    Op.LE: lambda x, y: ONE if _nonnegative(_sub(y, x)) else node(Op.LE, x, y),
-    Op.EQ: lambda x, y: ONE if _same(x, y) else node(Op.EQ, x, y),
-    Op.NE: lambda x, y: ZERO if _same(x, y) else node(Op.NE, x, y),
-    Op.FABS: lambda x, _: fabs(x.a) if x.op == Op.NEG else node(Op.FABS, x, x),
-    Op.SQRT: lambda x, _: fabs(x.a) if x.op == Op.SQ else node(Op.SQRT, x, x),
-    Op.COS: lambda x, _: cos(x.a) if x.op in (Op.NEG, Op.FABS) else node(Op.COS, x, x),
+    Op.LT: _lt,
+    Op.LE: _le,
+    Op.EQ: _eq,
+    Op.NE: _ne,
+    Op.FABS: _absolute,
+    Op.SQRT: _root,
+    Op.COS: _cosine,
 }
 
 
