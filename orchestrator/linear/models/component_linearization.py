@@ -119,6 +119,18 @@ def linearize_component(
 
     small, large = found.small, found.large
     one, other = step_map(small.after, small.outputs), step_map(large.after, large.outputs)
+    disagreement = max(
+        float(np.abs(a - b).max(initial=0.0)) for a, b in zip(one, other, strict=True)
+    )
+    one_sided = without_curvature(
+        (small.after_up, small.outputs_up), (large.after_up, large.outputs_up)
+    )
+    variants = [other, step_map(*one_sided)]
+    if found.narrow:
+        variants.append(step_map(found.usual.after, found.usual.outputs))
+    A_c = B_c = None
+    if derivatives and len(rates) == n:
+        A_c, B_c = small.slopes[:, :n], by_input(small.slopes)
     return ComponentLinearization(
         component.name,
         names,
@@ -128,20 +140,10 @@ def linearize_component(
         observed=tuple(observed),
         C_o=small.outputs[p:, :n],
         D_o=by_input(small.outputs[p:]),
-        A_c=small.slopes[:, :n] if len(rates) == n and derivatives else None,
-        B_c=by_input(small.slopes) if len(rates) == n and derivatives else None,
-        disagreement=max(
-            float(np.abs(a - b).max(initial=0.0)) for a, b in zip(one, other, strict=True)
-        ),
-        variants=(
-            other,
-            step_map(
-                *without_curvature(
-                    (small.after_up, small.outputs_up), (large.after_up, large.outputs_up)
-                )
-            ),
-            *([step_map(found.usual.after, found.usual.outputs)] if found.narrow else []),
-        ),
+        A_c=A_c,
+        B_c=B_c,
+        disagreement=disagreement,
+        variants=tuple(variants),
         narrow=found.narrow,
         doubtful=found.doubtful,
     )

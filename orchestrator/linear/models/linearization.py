@@ -5,7 +5,7 @@ travel one step late, that output as well: an output with direct feed-through fr
 older than itself is memory that the exchange adds. So is what is on its way over a connection with a delay. Everything
 else follows from the states."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 import scipy.sparse as sp
@@ -52,63 +52,99 @@ def compose(blocks: Blocks, schedule: Schedule, *, within_period: bool = False) 
         )
     if schedule.is_second_order:
         return line_model(blocks, schedule)
-    windows, names = blocks.state_windows(), blocks.state_names()
     held = _held_outputs(blocks, schedule)
-    memory = [i for name in held for i in range(len(blocks.output_names))[blocks.window[name]]]
-    n, p = len(names), len(blocks.output_names)
-    links = len(blocks.links)
-    # in the step before, and in this
-    arrived, arriving = 2 * p + np.arange(links), 2 * p + links + np.arange(links)
-    external = 2 * p + 2 * links + np.arange(len(blocks.inputs))
-    lines = _delay_lines(blocks, n + len(memory), blocks.step_size)
-    total = n + len(memory) + sum(len(line.A) for line, _ in lines.values())
-    equations = Equations(total, 2 * p + 2 * links + len(external))
-    # where in w the newest value of every output stands
-    newest = np.concatenate([np.arange(p), external])
     check_feedthrough(blocks, [name for name in blocks.components if name not in held])
-    for k, (line, where) in lines.items():
-        equations.output(arrived[k : k + 1], where, line.C_before, newest[:0], np.zeros((1, 0)))
-    for name, c in blocks.components.items():
-        if name not in held:
-            entries = blocks.entries(name, newest, arrived)
-            equations.output(newest[blocks.window[name]], windows[name], c.C, entries, c.D)
-    for k, i in enumerate(memory):
-        equations.output(
-            newest[i : i + 1], slice(n + k, n + k + 1), np.eye(1), newest[:0], np.zeros((1, 0))
-        )
+    walk = _Walk(blocks, held)
+    walk.begin()
     for group in schedule.groups:
-        inputs = {name: blocks.entries(name, newest, arriving) for name in group}
+        walk.deliver(group)
+        walk.step(group)
+    return walk.end()
+
+
+class _Walk:
+    """A walk through one communication step, which writes down how every output and state follows from others.
+
+    The vector z holds the components' states, the outputs that are memory, and what is on its way over delays. In w
+    stand all outputs as of the step before, then as of this step; what has arrived over each link before this step,
+    then what arrives in it; and the external inputs."""
+
+    def __init__(self, blocks: Blocks, held: Sequence[str]) -> None:
+        self._blocks, self._held = blocks, held
+        self._windows, self._names = blocks.state_windows(), blocks.state_names()
+        every = range(len(blocks.output_names))
+        self._memory = [i for name in held for i in every[blocks.window[name]]]
+        states = len(self._names) + len(self._memory)
+        self._lines = _delay_lines(blocks, states, blocks.step_size)
+        states += sum(len(line.A) for line, _ in self._lines.values())
+        p, links, externals = len(every), len(blocks.links), len(blocks.inputs)
+        self._arrived = 2 * p + np.arange(links)
+        self._arriving = 2 * p + links + np.arange(links)
+        # where in w the newest value of every output stands, and that of every external input
+        self._newest = np.concatenate([np.arange(p), 2 * p + 2 * links + np.arange(externals)])
+        self._inputs: dict[str, Indices] = {}  # where in w the inputs of the group stand
+        self._equations = Equations(states, 2 * p + 2 * links + externals)
+
+    def begin(self) -> None:
+        """Give the outputs at the beginning, and what has arrived, by the states."""
+        equations, newest, nothing = self._equations, self._newest, self._newest[:0]
+        for k, (line, where) in self._lines.items():
+            arrived = self._arrived[k : k + 1]
+            equations.output(arrived, where, line.C_before, nothing, np.zeros((1, 0)))
+        for name, c in self._blocks.components.items():
+            if name not in self._held:
+                entries = self._blocks.entries(name, newest, self._arrived)
+                window = newest[self._blocks.window[name]]
+                equations.output(window, self._windows[name], c.C, entries, c.D)
+        for i, place in self._places_of_memory():
+            equations.output(newest[i : i + 1], place, np.eye(1), nothing, np.zeros((1, 0)))
+
+    def deliver(self, group: Sequence[str]) -> None:
+        """Let the components of a group take their inputs, and delays what is sent to these."""
+        blocks, newest = self._blocks, self._newest
+        self._inputs = {name: blocks.entries(name, newest, self._arriving) for name in group}
         for name in group:
             for place, k in blocks.linked(name).items():
-                if k in lines:
-                    (line, where), sent = lines[k], newest[blocks.sources[name][place : place + 1]]
-                    equations.output(
-                        arriving[k : k + 1], where, line.C, sent, np.full((1, 1), line.d)
-                    )
-                    equations.next_state(where, where, line.A, sent, line.B)
+                if k not in self._lines:
+                    continue
+                (line, where), arriving = self._lines[k], self._arriving[k : k + 1]
+                sent = newest[blocks.sources[name][place : place + 1]]
+                self._equations.output(arriving, where, line.C, sent, np.full((1, 1), line.d))
+                self._equations.next_state(where, where, line.A, sent, line.B)
+
+    def step(self, group: Sequence[str]) -> None:
+        """Let the components of a group step; their outputs are those of this step from now on."""
+        p = len(self._blocks.output_names)
         for name in group:
-            c, x, u = blocks.components[name], windows[name], inputs[name]
-            A, B, _ = blocks.over_step(name)
-            equations.next_state(x, x, A, u, B)
-            newest[blocks.window[name]] = p + np.arange(p)[blocks.window[name]]
-            equations.output(newest[blocks.window[name]], x, c.C @ A, u, _after_step(c.C, B) + c.D)
-    for k, i in enumerate(memory):
-        equations.next_state(
-            slice(n + k, n + k + 1), slice(0, 0), np.zeros((1, 0)), newest[i : i + 1], np.eye(1)
+            c, x, u = self._blocks.components[name], self._windows[name], self._inputs[name]
+            window = self._blocks.window[name]
+            A, B, _ = self._blocks.over_step(name)
+            self._equations.next_state(x, x, A, u, B)
+            self._newest[window] = p + np.arange(p)[window]
+            D = _after_step(c.C, B) + c.D
+            self._equations.output(self._newest[window], x, c.C @ A, u, D)
+
+    def end(self) -> LinearModel:
+        """Keep the outputs that are memory for the next step, and give the model."""
+        blocks = self._blocks
+        nothing = np.zeros((1, 0))
+        for i, place in self._places_of_memory():
+            newest = self._newest[i : i + 1]
+            self._equations.next_state(place, slice(0, 0), nothing, newest, np.eye(1))
+        memory = [f"{blocks.output_names[i]}{HELD}" for i in self._memory]
+        links = [link.name for link in blocks.links.values()]
+        return self._equations.model(
+            [*self._names, *memory, *_line_names(blocks, self._lines)],
+            blocks.step_size,
+            blocks.disagreement,
+            blocks.how,
+            wires=[*blocks.output_names, *blocks.output_names, *links, *links, *blocks.inputs],
         )
-    all_names = (
-        *names,
-        *(f"{blocks.output_names[i]}{HELD}" for i in memory),
-        *_line_names(blocks, lines),
-    )
-    wired = [*blocks.output_names] * 2 + [link.name for link in blocks.links.values()] * 2
-    return equations.model(
-        all_names,
-        blocks.step_size,
-        blocks.disagreement,
-        blocks.how,
-        wires=[*wired, *blocks.inputs],
-    )
+
+    def _places_of_memory(self) -> Iterator[tuple[int, slice]]:
+        """The outputs that are memory, by number, and where they stand among the states."""
+        for place, i in enumerate(self._memory, start=len(self._names)):
+            yield i, slice(place, place + 1)
 
 
 def _after_step(C: Matrix, B: Matrix) -> Matrix:
@@ -227,11 +263,7 @@ def line_model(blocks: Blocks, schedule: Schedule) -> LinearModel:
     Raises an `AnalysisError` if direct feed-through closes a loop; if an output depends on an input of which its FMU
     says that it does not, as such an output is not read again after the step; or if a connection does more than carry
     its value."""
-    if blocks.links:
-        disturbed = ", ".join(link.name for link in blocks.links.values())
-        raise AnalysisError(
-            f"schedule {schedule.name!r} has no place for a connection with a delay or a cut: {disturbed}"
-        )
+    _check_links(blocks, schedule)
     check_feedthrough(blocks, list(blocks.components))
     _check_declared(blocks)
     p, windows, names = len(blocks.output_names), blocks.state_windows(), blocks.state_names()
@@ -292,6 +324,14 @@ def _guessed(blocks: Blocks, schedule: Schedule) -> list[int]:
         found |= {i for name in members for i in blocks.sources[name].tolist() if i < p} - known
         known |= {i for name in members for i in range(p)[blocks.window[name]]}
     return sorted(found)
+
+
+def _check_links(blocks: Blocks, schedule: Schedule) -> None:
+    if blocks.links:
+        disturbed = ", ".join(link.name for link in blocks.links.values())
+        raise AnalysisError(
+            f"schedule {schedule.name!r} has no place for a connection with a delay or a cut: {disturbed}"
+        )
 
 
 def _check_declared(blocks: Blocks) -> None:

@@ -116,11 +116,13 @@ class CoupledComponents(Closing):
         for name, component in self.components.items():
             own = [i for i, s in enumerate(sources) if s.component == name]
             feeding = [c for c in self.system.connections if c.target.component == name]
+            inputs = [c.target.variable for c in feeding]
+            outputs = [sources[i].variable for i in own]
             window = slice(own[0], own[-1] + 1) if own else slice(0)
             exchanges[name] = Exchange(
                 component,
-                RealBatch(component, [c.target.variable for c in feeding], apart(len(feeding))),
-                RealBatch(component, [sources[i].variable for i in own], self.y[window]),
+                RealBatch(component, inputs, apart(len(inputs))),
+                RealBatch(component, outputs, self.y[window]),
                 window,
                 np.array([place[c.source] for c in feeding], dtype=np.int64),
             )

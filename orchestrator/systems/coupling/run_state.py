@@ -79,6 +79,10 @@ class RunState:
 
         index, applied, handed_over = map(int, arrays["place"].tolist())
         seconds, *spent = arrays["seconds"].tolist()
+        states = {name: state.tobytes() for name, state in beginning("component ").items()}
+        observers = [
+            _position(beginning(f"observer {k} ")) for k in range(int(arrays["observers"]))
+        ]
         return cls(
             index=index,
             applied=bool(applied),
@@ -88,16 +92,15 @@ class RunState:
             y=arrays["y"],
             tracks=arrays["tracks"],
             before=arrays["before"],
-            components={name: values.tobytes() for name, values in beginning("component ").items()},
-            observers=[
-                {
-                    name: values if values.ndim else values.item()
-                    for name, values in beginning(f"observer {k} ").items()
-                }
-                for k in range(int(arrays["observers"]))
-            ],
+            components=states,
+            observers=observers,
             wires=[beginning(f"wires {k} ") for k in range(int(arrays["wires"]))],
         )
+
+
+def _position(arrays: Mapping[str, NDArray[Any]]) -> Position:
+    """An observer's position, in which an array without dimensions is a single value."""
+    return {name: values if values.ndim else values.item() for name, values in arrays.items()}
 
 
 def resume_observers(observers: Iterable[object], kept: RunState) -> None:
