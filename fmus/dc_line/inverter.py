@@ -5,7 +5,7 @@ rectifier what that is."""
 
 from fmus.dc_line.bridges import BENCHMARK, DEGREE, angle_of, declare_bridges
 from fmus.dc_line.rectifier import INVERTER_KV
-from fmus.dc_line.station import declare_station
+from fmus.dc_line.station import USUAL, declare_station
 from fmus.toolchain.model import Model
 from fmus.toolchain.phasor_port import phasor_builder
 from fmus.toolchain.symbols import Expr, cos, fmax, fmin, if_else
@@ -23,7 +23,7 @@ NO_ORDER = 1e4
 def lcc_inverter_phasor() -> Model:
     """The inverter, phasor type."""
     title = "Inverter of a DC line (phasor type)"
-    m = phasor_builder("lcc_inverter_phasor", title, kind="load")
+    m = phasor_builder("lcc_inverter_phasor", title, kind="load", usual=USUAL)
     station = declare_station(m, P_0=0.98)
     bridges = declare_bridges(m, X_C, E_N)
     text = "DC voltage at the operating point"

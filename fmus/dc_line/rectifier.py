@@ -17,7 +17,7 @@ from fmus.dc_line.orders import (
     declare_interruptions,
     declare_measured,
 )
-from fmus.dc_line.station import Station, declare_station
+from fmus.dc_line.station import USUAL, Station, declare_station
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import phasor_builder
@@ -68,7 +68,7 @@ class _Line:
 def lcc_rectifier_phasor() -> Model:
     """The rectifier with the line's control, phasor type."""
     title = "Rectifier of a DC line with the control CDC4T of PSS/E (phasor type)"
-    m = phasor_builder("lcc_rectifier_phasor", title, kind="load")
+    m = phasor_builder("lcc_rectifier_phasor", title, kind="load", usual=USUAL)
     station = declare_station(m, P_0=-1.0)
     bridges = declare_bridges(m, X_C, E_N)
     circuit, mode = _declare_line(m)

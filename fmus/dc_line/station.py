@@ -20,6 +20,9 @@ from fmus.toolchain.phasor_port import (
 )
 from fmus.toolchain.port import DevicePort, declare_rating, device_port_of
 from fmus.toolchain.symbols import Expr, fmax
+from fmus.toolchain.variables import usual_beside
+
+USUAL = usual_beside(__file__)
 
 Fed = Callable[[Expr, Expr], tuple[Expr, Expr]]
 """Bus voltage [pu], time after now [s] → active power into the bus [MW], reactive power out of it [Mvar]."""

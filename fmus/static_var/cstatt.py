@@ -1,4 +1,4 @@
-"""PSS/E's CSTATT: a static condenser (STATCOM), a voltage behind a reactance.
+"""PSS/E's CSTATT, and CSTCNT of a FACTS device: a static condenser (STATCOM), a voltage behind a reactance.
 
     V_ref − v − DROOP·I → (1+sT_1)(1+sT_2)/((1+sT_3)(1+sT_4)) → within V_MIN and V_MAX → K/s, within limits → E
     I = (E − v)/X_t        [pu, S_n; above 0 capacitive]
@@ -8,11 +8,18 @@
 E has the phase of the bus voltage, so that no active power is fed. At the start E follows from the reactive power of
 the power flow, and V_ref from its current.
 
-Source: PowerWorld's guide to PSS/E's models, the diagram and the fields of CSTATT; defaults as OPAL-RT lists them for
-CSTCNT. That the inductive current falls below V_CUTOFF as the capacitive one does is ours; so is S_n as the base of
-DROOP, as it is that of X_t."""
+Sources: PowerWorld's guide to PSS/E's models, the diagram and the fields of CSTATT; OPAL-RT's
+ephasorsim-modelica-library at cba975b for CSTCNT, its equations, the order of its fields and the defaults: it lets the
+inductive current fall below V_CUTOFF as the capacitive one does. S_n as the base of DROOP is ours, as it is that of
+X_t."""
 
 from fmus.converter_parts.bus_voltage import extrapolated_voltage
+from fmus.static_var.held_bus import (
+    HeldVoltage,
+    held_voltage,
+    holds_elsewhere,
+    named_by_bus,
+)
 from fmus.static_var.susceptance import MOST_POWER
 from fmus.toolchain.blocks import clamp, held_at_limits, lead_lag
 from fmus.toolchain.frames import Phasor, power
@@ -36,8 +43,20 @@ LEAST_VOLTAGE = 1e-3
 """Voltage below which the phase of the emf is not known, and its current falls with it [pu]."""
 
 
-def cstatt_phasor() -> Model:
-    """The static condenser, phasor type."""
+def cstatt_phasor(records: str = "CSTATT") -> Model:
+    """The static condenser, phasor type.
+
+    Parameters
+    ----------
+    records
+        PSS/E's name of its record, CSTATT or CSTCNT; behind it the word ``elsewhere`` if it holds another bus' voltage.
+
+    Raises
+    ------
+    ValueError
+        If it is none of these.
+    """
+    elsewhere = holds_elsewhere(records, ("CSTATT", "CSTCNT"))
     title = "Static condenser CSTATT of PSS/E (phasor type)"
     m = phasor_builder("cstatt_phasor", title, kind="load")
     rating = declare_rating(m, S_N)
@@ -50,7 +69,8 @@ def cstatt_phasor() -> Model:
     seen = extrapolated_voltage(m, port, master)
     seen.follow(m, port.v)
     size = seen.value.magnitude()
-    E = _emf(m, port, size, X)
+    held = held_voltage(m, port, seen, elsewhere=elsewhere)
+    E = _emf(m, port, size, held, X)
 
     def emf(time: Expr) -> Phasor:
         v = seen.after(time)
@@ -60,13 +80,14 @@ def cstatt_phasor() -> Model:
     source = SourceEmf(behind=emf(-master.size / 2), ahead=emf(master.to_next))
     declare_phasor_outputs(m, port, source, Z)
     m.output("I", (E - size) / X, "pu", "Current; above 0 capacitive", base="S_n")
-    return m.build()
+    return named_by_bus(m.build(), elsewhere=elsewhere)
 
 
-def _emf(m: ModelBuilder, port: DevicePort, size: Expr, X: Expr) -> Expr:
+def _emf(m: ModelBuilder, port: DevicePort, size: Expr, held: HeldVoltage, X: Expr) -> Expr:
     """Declare the regulator; return the size of the emf [pu].
 
-    ``size``: measured voltage [pu]; ``X``: reactance between emf and bus [pu, S_n]."""
+    ``size``: measured voltage of the own bus [pu]; ``held``: of the bus that is held; ``X``: reactance between emf and
+    own bus [pu, S_n]."""
 
     def seconds(name: str, start: float, text: str) -> Expr:
         return m.parameter(name, start, "s", text, minimum=0, source=SOURCE)
@@ -96,9 +117,11 @@ def _emf(m: ModelBuilder, port: DevicePort, size: Expr, X: Expr) -> Expr:
     m.require(I_C - I_0 + MOST_POWER, f"{text} ICMAX: lower Q_0, or raise ICMAX")
     m.require(I_0 + I_L + MOST_POWER, f"{text} ILMAX: raise Q_0, or raise ILMAX")
     m.require(E_LIMIT - E_0 + MOST_POWER, f"{text} ELIMIT: lower Q_0, or raise ELIMIT")
-    reference = m.calculated("Vref", size_0 + droop * I_0, "pu", "Voltage reference", base="bus")
+    reference = m.calculated(
+        "Vref", held.start + droop * I_0, "pu", "Voltage reference", base="bus"
+    )
     E = m.state("emf", E_0, "pu", "integrator with limits, the emf", base="bus")
-    error = reference - size - droop * (E - size) / X
+    error = reference - held.now - droop * (E - size) / X
     first = lead_lag(m, "first", error, leads[0], lags[0])
     second = lead_lag(m, "second", first, leads[1], lags[1])
     share = if_else(size < cutoff, size / fmax(cutoff, LEAST_VOLTAGE), 1)

@@ -11,12 +11,28 @@ Sources: PowerWorld's guide to PSS/E's models for the fields, ANDES' table of PS
 iPSL's `Banks/PSSE/SVC/SVC.mo` for the override."""
 
 from fmus.static_var.csvgn1 import S_N
+from fmus.static_var.held_bus import holds_elsewhere
 from fmus.static_var.reactor import overridden_susceptance
 from fmus.static_var.susceptance import susceptance_model
 from fmus.toolchain.model import Model
 
 
-def csvgn3_phasor() -> Model:
-    """The static var compensator with its override, phasor type."""
+def csvgn3_phasor(records: str = "CSVGN3") -> Model:
+    """The static var compensator with its override, phasor type.
+
+    Parameters
+    ----------
+    records
+        PSS/E's name of its record, CSVGN3 or CSVGN4; behind it the word ``elsewhere`` if it holds another bus'
+        voltage.
+
+    Raises
+    ------
+    ValueError
+        If it is none of these.
+    """
+    elsewhere = holds_elsewhere(records, ("CSVGN3", "CSVGN4"))
     title = "Static var compensator CSVGN3 or CSVGN4 of PSS/E (phasor type)"
-    return susceptance_model("csvgn3_phasor", title, S_N, overridden_susceptance)
+    return susceptance_model(
+        "csvgn3_phasor", title, S_N, overridden_susceptance, elsewhere=elsewhere
+    )

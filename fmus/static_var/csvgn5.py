@@ -10,6 +10,7 @@ power flow, and V_ref from B.
 Sources: PowerWorld's guide to PSS/E's models for the fields, InterPSS' `Csvgn5Model` for the equations (it compares
 them with PSS/E 36.7); with D_V = 0 InterPSS takes 0 in the product with K_SD, which would make B jump."""
 
+from fmus.static_var.held_bus import HeldVoltage, holds_elsewhere
 from fmus.static_var.susceptance import MOST_POWER, initial_susceptance, susceptance_model
 from fmus.toolchain.blocks import (
     lead_lag,
@@ -29,13 +30,27 @@ S_N = 100.0
 """Default rating [MVA]."""
 
 
-def csvgn5_phasor() -> Model:
-    """The static var compensator, phasor type."""
+def csvgn5_phasor(records: str = "CSVGN5") -> Model:
+    """The static var compensator, phasor type.
+
+    Parameters
+    ----------
+    records
+        PSS/E's name of its record, CSVGN5; behind it the word ``elsewhere`` if it holds another bus' voltage.
+
+    Raises
+    ------
+    ValueError
+        If it is none of these.
+    """
+    elsewhere = holds_elsewhere(records, ("CSVGN5",))
     title = "Static var compensator CSVGN5 of PSS/E (phasor type)"
-    return susceptance_model("csvgn5_phasor", title, S_N, _susceptance)
+    return susceptance_model("csvgn5_phasor", title, S_N, _susceptance, elsewhere=elsewhere)
 
 
-def _susceptance(m: ModelBuilder, port: DevicePort, rating: Expr, v: Phasor) -> Expr:
+def _susceptance(
+    m: ModelBuilder, port: DevicePort, rating: Expr, v: Phasor, held: HeldVoltage
+) -> Expr:
     def seconds(name: str, start: float, text: str) -> Expr:
         return m.parameter(name, start, "s", text, minimum=0, source=SOURCE)
 
@@ -63,7 +78,7 @@ def _susceptance(m: ModelBuilder, port: DevicePort, rating: Expr, v: Phasor) -> 
     T_thyristors = seconds("Ts6", 0.043, "Lag of the thyristors' control; 0 leaves it out")
     D_V = voltage("DV", 0.061, "Voltage error of the override; 0: Bpmax/Ksvs and Bpmin/Ksvs")
 
-    B_0, size_0 = initial_susceptance(m, port), port.v_0.magnitude()
+    B_0 = initial_susceptance(m, port)
     error_0 = B_0 / K_SVS
     chosen = D_V <= 0
     above = if_else(chosen, high / K_SVS, D_V)
@@ -89,8 +104,8 @@ def _susceptance(m: ModelBuilder, port: DevicePort, rating: Expr, v: Phasor) -> 
         if_else(chosen, too_low, 1), f"{acts}, with DV = 0 at Bpmin: raise Q_0, or lower Bpmin"
     )
 
-    reference = m.calculated("Vref", size_0 + error_0, "pu", "Voltage reference", base="bus")
-    seen = low_pass_or_nothing(m, "measured", v.magnitude(), T_filter, size_0)
+    reference = m.calculated("Vref", held.start + error_0, "pu", "Voltage reference", base="bus")
+    seen = low_pass_or_nothing(m, "measured", held.now, T_filter, held.start)
     error = reference - seen
     first = lead_lag(m, "first", limit(error, most_error), leads[0], lags[0], error_0)
     second = lead_lag(m, "second", first, leads[1], lags[1], error_0)

@@ -5,6 +5,7 @@
 
 Sources: `fmus.static_var.csvgn1`, `fmus.static_var.csvgn3`."""
 
+from fmus.static_var.held_bus import HeldVoltage
 from fmus.static_var.susceptance import MOST_POWER, initial_susceptance
 from fmus.toolchain.blocks import clamp, lead_lag, limited_low_pass
 from fmus.toolchain.frames import Phasor
@@ -21,20 +22,24 @@ OVERRIDE = 0.15
 """Default distance of the voltage from its reference from which on the override acts [pu]."""
 
 
-def reactor_susceptance(m: ModelBuilder, port: DevicePort, rating: Expr, v: Phasor) -> Expr:
+def reactor_susceptance(
+    m: ModelBuilder, port: DevicePort, rating: Expr, v: Phasor, held: HeldVoltage
+) -> Expr:
     """The compensator's susceptance [pu, S_n] at a bus voltage [pu], by its regulator alone."""
-    return _susceptance(m, port, rating, v, None)
+    return _susceptance(m, port, rating, held, None)
 
 
-def overridden_susceptance(m: ModelBuilder, port: DevicePort, rating: Expr, v: Phasor) -> Expr:
+def overridden_susceptance(
+    m: ModelBuilder, port: DevicePort, rating: Expr, v: Phasor, held: HeldVoltage
+) -> Expr:
     """The same with the override: further than V_OV from its reference, the voltage asks for all, or for no reactor."""
     text = "Distance of the voltage from its reference from which on the override acts"
     V_OV = m.parameter("VOV", OVERRIDE, "pu", text, base="bus", minimum=0, source=SOURCE)
-    return _susceptance(m, port, rating, v, V_OV)
+    return _susceptance(m, port, rating, held, V_OV)
 
 
 def _susceptance(
-    m: ModelBuilder, port: DevicePort, rating: Expr, v: Phasor, override: Expr | None
+    m: ModelBuilder, port: DevicePort, rating: Expr, held: HeldVoltage, override: Expr | None
 ) -> Expr:
     def number(name: str, start: float, unit: str, text: str, least: float | None = None) -> Expr:
         base = "S_n" if unit == "pu" else ""
@@ -49,14 +54,13 @@ def _susceptance(
     V_MAX = number("VMAX", 1.0, "pu", "Upper limit of the control")
     V_MIN = number("VMIN", 0.0, "pu", "Lower limit of the control")
     C_BASE = number("CBASE", 300.0, "Mvar", "Fixed capacitor")
-    size_0 = port.v_0.magnitude()
     y_0 = C_BASE / rating - initial_susceptance(m, port)
     for low, high, name in ((V_MIN, V_MAX, "VMIN to VMAX"), (least / rating, 1, "RMIN to S_n")):
         text = f"the power flow's reactive power asks for a reactor outside of {name}"
         m.require(y_0 - low + MOST_POWER, f"{text}: lower Q_0, or change CBASE")
         m.require(high - y_0 + MOST_POWER, f"{text}: raise Q_0, or change CBASE")
-    reference = m.calculated("Vref", size_0 - y_0 / K, "pu", "Voltage reference", base="bus")
-    error = v.magnitude() - reference
+    reference = m.calculated("Vref", held.start - y_0 / K, "pu", "Voltage reference", base="bus")
+    error = held.now - reference
     first = lead_lag(m, "first", K * error, leads[0], T3, y_0)
     second = lead_lag(m, "second", first, leads[1], T4, y_0)
     asked = clamp(second, V_MIN, V_MAX)

@@ -6,6 +6,7 @@ The bus voltage that its control measures goes through two lags that extrapolate
 from collections.abc import Callable
 
 from fmus.converter_parts.bus_voltage import extrapolated_voltage
+from fmus.static_var.held_bus import HeldVoltage, held_voltage, named_by_bus
 from fmus.toolchain.frames import Phasor, power
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
@@ -21,14 +22,18 @@ from fmus.toolchain.symbols import Expr, fabs
 MOST_POWER = 1e-4
 """Active power of the power flow that a compensator may have [pu, S_n]: rounding of a file."""
 
-Control = Callable[[ModelBuilder, DevicePort, Expr, Phasor], Expr]
-"""Builder, port, rating [MVA] and measured bus voltage [pu] → susceptance [pu, S_n]; above 0 capacitive."""
+Control = Callable[[ModelBuilder, DevicePort, Expr, Phasor, HeldVoltage], Expr]
+"""Builder, port, rating [MVA], measured voltage of the own bus and of that which is held [pu] → susceptance [pu, S_n];
+above 0 capacitive."""
 
 
-def susceptance_model(name: str, title: str, rating_mva: float, control: Control) -> Model:
+def susceptance_model(
+    name: str, title: str, rating_mva: float, control: Control, *, elsewhere: bool = False
+) -> Model:
     """The model of a compensator, phasor type.
 
-    ``rating_mva``: default rating [MVA]; ``control``: gives its susceptance."""
+    ``rating_mva``: default rating [MVA]; ``control``: gives its susceptance; ``elsewhere``: whether it holds another
+    bus' voltage."""
     m = phasor_builder(name, title, kind="load")
     rating = declare_rating(m, rating_mva)
     port = device_port_of(m, rating, P_0=0.0)
@@ -39,7 +44,8 @@ def susceptance_model(name: str, title: str, rating_mva: float, control: Control
     master = declare_master_step(m)
     seen = extrapolated_voltage(m, port, master)
     seen.follow(m, port.v)
-    B = control(m, port, rating, seen.value)
+    held = held_voltage(m, port, seen, elsewhere=elsewhere)
+    B = control(m, port, rating, seen.value, held)
 
     def emf(time: Expr) -> Phasor:
         v = seen.after(time)
@@ -49,7 +55,7 @@ def susceptance_model(name: str, title: str, rating_mva: float, control: Control
         m, port, SourceEmf(behind=emf(-master.size / 2), ahead=emf(master.to_next)), Z
     )
     m.output("B", B, "pu", "Susceptance; above 0 capacitive", base="S_n")
-    return m.build()
+    return named_by_bus(m.build(), elsewhere=elsewhere)
 
 
 def initial_susceptance(m: ModelBuilder, port: DevicePort) -> Expr:

@@ -20,6 +20,7 @@ them (`Svsmo1t2Model`)."""
 
 from dataclasses import dataclass
 
+from fmus.static_var.held_bus import HeldVoltage, holds_elsewhere
 from fmus.static_var.susceptance import MOST_POWER, initial_susceptance, susceptance_model
 from fmus.toolchain.blocks import (
     BYPASS_TIME,
@@ -47,10 +48,23 @@ LEAST_LIMIT = 1e-9
 """Distance of both limits of the regulator [pu, S_n]: a sign of a file that has none must not turn them around."""
 
 
-def svsmo1_phasor() -> Model:
-    """The static var system, phasor type."""
+def svsmo1_phasor(records: str = "SVSMO1T2") -> Model:
+    """The static var system, phasor type.
+
+    Parameters
+    ----------
+    records
+        PSS/E's name of its record, SVSMO1T2 or SVSMO1T3; behind it the word ``elsewhere`` if it holds another bus'
+        voltage.
+
+    Raises
+    ------
+    ValueError
+        If it is none of these.
+    """
+    elsewhere = holds_elsewhere(records, ("SVSMO1T2", "SVSMO1T3"))
     title = "Static var system SVSMO1 of WECC (phasor type)"
-    return susceptance_model("svsmo1_phasor", title, S_N, _susceptance)
+    return susceptance_model("svsmo1_phasor", title, S_N, _susceptance, elsewhere=elsewhere)
 
 
 @dataclass(frozen=True)
@@ -76,22 +90,24 @@ class _Numbers:
         return self.m.parameter(name, start, unit, text, base=base, minimum=0, source=SOURCE)
 
 
-def _susceptance(m: ModelBuilder, port: DevicePort, rating: Expr, v: Phasor) -> Expr:
+def _susceptance(
+    m: ModelBuilder, port: DevicePort, rating: Expr, v: Phasor, held: HeldVoltage
+) -> Expr:
     """The susceptance [pu, S_n] at a bus voltage [pu]."""
     p = _Numbers(m)
     size, size_0 = v.magnitude(), port.v_0.magnitude()
     B_0 = initial_susceptance(m, port)
     T_lead = p.seconds("Tc1", 0.0, "Lead of the measurement")
     T_lag = p.seconds("Tb1", 0.012, "Lag of the measurement; 0 leaves it out")
-    measured = lead_lag(m, "measured", size, T_lead, T_lag, size_0)
-    slope, slope_0 = _slopes(m, p, size, size_0)
+    measured = lead_lag(m, "measured", held.now, T_lead, T_lag, held.start)
+    slope, slope_0 = _slopes(m, p, held.now, held.start)
     T_firing = p.seconds("T2", 0.012, "Lag of the firing; 0 leaves it out")
     limits = _limits(m, p, B_0)
     B = m.state("susceptance", B_0, "pu", "first-order lag with limits", base="S_n")
     slow, slow_0 = _slow_control(m, p, B, B_0, rating)
     drop_0 = slope_0 * B_0 * size_0
     text = "Voltage reference, without the slow control's part"
-    reference = m.calculated("Vref", size_0 + drop_0 - slow_0, "pu", text, base="bus")
+    reference = m.calculated("Vref", held.start + drop_0 - slow_0, "pu", text, base="bus")
     lowest = fmin(p.voltage("Vrefmin", 0.8, "Lowest reference", 0), reference + slow_0)
     highest = fmax(p.voltage("Vrefmax", 1.2, "Highest reference", 0), reference + slow_0)
     raw = clamp(reference + slow, lowest, highest) - measured - slope * B * size

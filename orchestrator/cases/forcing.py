@@ -6,7 +6,13 @@ from dataclasses import replace
 from typing import Any
 
 from orchestrator.cases.case import Case
-from orchestrator.cases.form.schema import BusFaultTable, CaseTable, ForcingTable, LineFaultTable
+from orchestrator.cases.form.schema import (
+    BusFaultTable,
+    CaseTable,
+    ForcingTable,
+    LineFaultTable,
+    ScenarioTable,
+)
 from orchestrator.cases.networks.data import bus_name
 from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
@@ -53,17 +59,22 @@ def with_events(case: Case, forcings: Sequence[str], faults: Sequence[str]) -> C
         *(event_of(Option.FORCE, text) for text in forcings),
         *(event_of(Option.FAULT, text) for text in faults),
     ]
-    scenarios = {
-        name: table.model_copy(update={"events": None})
-        for name, table in case.table.scenarios.items()
-    }
-    table: CaseTable = case.table.model_copy(update={"events": events, "scenarios": scenarios})
     said = [
         f'{word} "{text}"'
         for word, texts in (("force", forcings), ("fault", faults))
         for text in texts
     ]
+    scenarios = {
+        name: table.model_copy(update={"events": None, "title": _title(table, said)})
+        for name, table in case.table.scenarios.items()
+    }
+    table: CaseTable = case.table.model_copy(update={"events": events, "scenarios": scenarios})
     return replace(case, table=table, events_given=tuple(said))
+
+
+def _title(scenario: ScenarioTable, said: Sequence[str]) -> str:
+    """The title of a scenario with other events: these, where its own title told of events of its own."""
+    return ", ".join(said) if scenario.events and scenario.title else scenario.title
 
 
 def _reason(detail: Any) -> str:

@@ -42,6 +42,47 @@ def test_it_starts_at_rest_with_the_power_flows_reactive_power(name):
     assert found["p"] == pytest.approx(0, abs=1e-12)
 
 
+OF_OTHER_BUSES = {
+    "csvgn3": ("CSVGN4 elsewhere", "B"),
+    "csvgn5": ("CSVGN5 elsewhere", "B"),
+    "cstatt": ("CSTCNT elsewhere", "I"),
+    "svsmo1": ("SVSMO1T2 elsewhere", "B"),
+}
+"""Models that can hold another bus' voltage: what they are built of, and the output that follows it."""
+
+
+@pytest.mark.parametrize("name", OF_OTHER_BUSES)
+def test_at_another_bus_it_starts_at_rest_whatever_that_voltage_is(name):
+    records, _ = OF_OTHER_BUSES[name]
+    own = {"CBASE": 60.0} if name == "csvgn3" else {}
+    device = Evaluated(MODELS[name](records), POINT | own | {"held.v_0": 0.97})
+    held = 0.97
+    assert max(map(abs, device.rates([*BUS, held]).values())) < 1e-10
+    assert device.outputs([*BUS, held])["q"] == pytest.approx(POINT["Q_0"])
+
+
+@pytest.mark.parametrize("frequency", [0.05, 0.5, 2.0])
+@pytest.mark.parametrize("name", OF_OTHER_BUSES)
+def test_both_buses_together_move_it_as_its_own_bus_does(name, frequency):
+    """The control hears the other bus, the reactance and the slope the own one: their responses add up."""
+    s, (records, output) = 2j * np.pi * frequency, OF_OTHER_BUSES[name]
+    own = {"CBASE": 60.0} if name == "csvgn3" else {}
+    at = {"held.v_0": POINT["v_0"]}
+    other = Evaluated(MODELS[name](records), POINT | own | at).response(s, [*BUS, POINT["v_0"]])
+    alone = compensator(name).response(s, BUS)[output, "v_re"]
+    both = other[output, "held.v"] + other[output, "v_re"]
+    assert both == pytest.approx(alone, rel=1e-9)
+    assert abs(other[output, "held.v"]) > 10 * abs(other[output, "v_re"]) or name == "cstatt"
+    if name in ("csvgn3", "csvgn5"):  # nothing of the own bus is in their susceptance
+        assert other[output, "v_re"] == pytest.approx(0, abs=1e-12)
+
+
+@pytest.mark.parametrize("records", ["CSVGN1 elsewhere", "CSVGN5 else", "elsewhere", ""])
+def test_what_it_is_built_of_is_one_of_its_records(records):
+    with pytest.raises(ValueError, match="write CSVGN5, or that with 'elsewhere'"):
+        csvgn5_phasor(records)
+
+
 @pytest.mark.parametrize("frequency", [0.05, 0.5, 2.0])
 def test_csvgn5_follows_the_voltage_by_its_transfer_function(frequency):
     s, device = 2j * np.pi * frequency, compensator("csvgn5")

@@ -125,6 +125,7 @@ class NetworkData:
     counted_controls: str = ""  # how many could move, in words
     sequences: SequenceData | None = None  # of the negative and the zero sequence, from a file
     dc_lines: tuple[SolvedLine, ...] = ()  # DC lines with a model of their own
+    merged: Mapping[int, int] = field(default_factory=dict)  # bus → the one that stands for both
 
 
 def network_data(
@@ -208,6 +209,7 @@ def network_data(
         counted_controls=found.counted_controls,
         sequences=sequences.data if sequences else _without_file(found),
         dc_lines=found.dc_lines,
+        merged=found.raw.same if found.raw else {},
     )
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
 from typing import Protocol
@@ -134,6 +134,14 @@ class ElementNames:
                 + f": the file has {len(found)} elements of this name: {few(found, _SHOWN)}; give one of these"
             )
         return found[0] if found else name
+
+    def with_meanings(self, meant: Mapping[str, str]) -> ElementNames:
+        """Return the same with names that mean further identifiers."""
+        added = {_plain(name): identifier for name, identifier in meant.items()}
+        others = {
+            name: (*self.meant.get(name, ()), identifier) for name, identifier in added.items()
+        }
+        return replace(self, meant={**self.meant, **others})
 
     def as_json(self) -> dict[str, dict[str, str]]:
         """Return the key ``names`` of a result: what is shown for each identifier; without names, no key."""

@@ -1,4 +1,4 @@
-"""Where a plant's controller measures: a bus, and a branch at one end, as a file of dynamics data names them."""
+"""Where a plant's controller or a compensator measures: a bus, and a branch at one end, by a file of dynamics."""
 
 from dataclasses import dataclass
 
@@ -7,13 +7,16 @@ from dataclasses import dataclass
 class MeasuredPoint:
     """A bus whose voltage is measured, and a branch whose power is, from ``near`` to ``far``; numbers of the file.
 
-    0 stands for the unit's own bus and its own power. ``place``: file and line that name it."""
+    0 stands for the unit's own bus and its own power. ``place``: file and line that name it; ``record``: PSS/E's
+    name of what measures; ``of_voltage``: whether it measures a voltage alone."""
 
     bus: int
     near: int
     far: int
     circuit: str
     place: str = ""
+    record: str = "REPCA1"
+    of_voltage: bool = False
 
     @property
     def is_own(self) -> bool:

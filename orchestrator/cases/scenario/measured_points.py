@@ -1,4 +1,4 @@
-"""Points of the network at which the controllers of plants measure: their connections and their start values."""
+"""Points of the network at which plants' controllers and compensators measure: connections and start values."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,9 @@ from orchestrator.cases.networks.data import bus_name
 from orchestrator.cases.networks.measured_point import MeasuredPoint
 from orchestrator.core.errors import InputError
 
-PLANT = "REPCA1"
+OF_VOLTAGE = ("held.v",)
+"""Input of a compensator that holds another bus' voltage [pu]."""
+
 INPUTS = ("plant.v", "plant.p", "plant.q")
 """Inputs of a plant that measures elsewhere: voltage [pu], active and reactive power [pu, 100 MVA]."""
 
@@ -33,11 +35,14 @@ def measured_sources(draft: Draft, name: str, own_bus: str) -> list[tuple[str, s
     if point is None or draft.grid is None:
         return []
     try:
-        found = find_point(draft, point, own_bus, PLANT)
+        found = find_point(draft, point, own_bus, point.record)
     except InputError as error:
         draft.note(point.place, f"{name}: {error}")
-        draft.found.refused_inputs.update(f"{name}.{variable}" for variable in INPUTS)
+        inputs = OF_VOLTAGE if point.of_voltage else INPUTS
+        draft.found.refused_inputs.update(f"{name}.{variable}" for variable in inputs)
         return []
+    if point.of_voltage:
+        return [(f"{draft.grid}.{found.bus}.v", f"{name}.{OF_VOLTAGE[0]}")]
     if found.is_far:
         draft.system.components[name].parameters["plant.reversed"] = True
     of_power = found.line or name
@@ -57,7 +62,10 @@ def start_measured_points(draft: Draft, flow: PowerFlow) -> None:
         if name not in draft.system.components:
             continue
         plan = draft.system.components[name]
-        found = find_point(draft, point, buses[name], PLANT)
+        found = find_point(draft, point, buses[name], point.record)
+        if point.of_voltage:
+            plan.parameters["held.v_0"] = abs(flow.voltages[found.bus])
+            continue
         if found.line is None:
             power = flow.powers[name] * plan.number("S_n") / plan.number("S_base")
         else:
@@ -84,6 +92,8 @@ def find_point(draft: Draft, point: MeasuredPoint, own_bus: str, record: str) ->
     assert draft.network is not None
     bus = bus_name(str(point.bus)) if point.bus else own_bus
     remedy = f"correct it, or write {without_models([record])}, and the references are constant"
+    if point.of_voltage:
+        remedy = "correct it, or write 0 for its own bus"
     if bus not in draft.network.buses:
         raise InputError(
             f"{record} measures at bus {point.bus}, which the network has not; {remedy}"

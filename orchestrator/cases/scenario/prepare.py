@@ -228,6 +228,14 @@ class PreparedScenario:
         return replace(ready, schedule=replace(ready.schedule, tolerance=tolerance))
 
 
+def _names(draft: Draft) -> ElementNames:
+    """Names of the network's file; a DC line's with a model means its rectifier's station."""
+    if draft.data is None or draft.network is None:
+        return ElementNames()
+    found = names_of(draft.network, draft.data)
+    return found.with_meanings({one.line.name: one.rectifier.name for one in draft.dc_lines})
+
+
 def _machine(plan: ComponentPlan) -> str:
     """The model of a machine, and what it assumes of itself; EMT and phasor models of one machine are one."""
     known = plan.description.variables
@@ -360,9 +368,7 @@ class Preparer:
             file_limits=draft.data.limits if draft.data else FileLimits(),
             file_voltages=draft.data.file_voltages if draft.data else FileVoltages(),
             titles=draft.data.titles if draft.data else {},
-            names=names_of(draft.network, draft.data)
-            if draft.data and draft.network
-            else ElementNames(),
+            names=_names(draft),
             regions=draft.data.regions if draft.data else Regions(),
             recorded_loads=draft.data.recorded_loads if draft.data else frozenset(),
             base_ratings=draft.base_ratings,

@@ -31,6 +31,7 @@ from orchestrator.cases.networks.psse.dyr_units import (
     rows_of_machines,
     with_choices,
     with_infinite_buses,
+    with_known_buses,
     with_records,
     without_idle_controls,
 )
@@ -303,6 +304,8 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> tuple[list[UnitRow], Sequen
         idle,
         approximate=table.dyr_approximate,
     )
+    if draft.data is not None:
+        rows = with_known_buses(rows, draft.data.merged, draft.data.buses)
     motors = _account(draft, table, records, ours)
     rows = with_choices(rows, replaced, chosen_parts(table))
     rows = without_idle_controls(rows, str(path), _choosing_exciters(draft, rows))

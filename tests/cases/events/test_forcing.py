@@ -1,12 +1,14 @@
 """References that swing: in a case file, by ``--force`` and in a run."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import orchestrator as gfor
-from orchestrator.cases.forcing import event_of
+from orchestrator.cases.case import load_case
+from orchestrator.cases.forcing import event_of, with_events
 from orchestrator.core.errors import CaseError, InputError
 from orchestrator.core.options import Option
 from orchestrator.systems.coupling.events import Forcing
@@ -17,6 +19,18 @@ def values(**changed):
     event = Forcing(1.0, "sg1", "governor.delta_P_ref", **given)
     changes = list(event.values(1e-3, 6.0))
     return np.array([c.time for c in changes]), np.array([c.value for c in changes])
+
+
+def test_a_fault_of_the_command_takes_the_title_of_the_one_that_it_replaces():
+    case = load_case("wscc9")
+    own = {"base": case.table.scenarios["base"], "fault": case.table.scenarios["gfor"]}
+    own["fault"] = own["fault"].model_copy(
+        update={"title": "Fault of 100 ms at bus 7", "events": case.table.events}
+    )
+    told = replace(case, table=case.table.model_copy(update={"scenarios": own}))
+    found = with_events(told, (), ["bus_9, 150 ms"]).table.scenarios
+    assert found["base"].title == own["base"].title
+    assert found["fault"].title == 'fault "bus_9, 150 ms"'
 
 
 def test_a_sine_is_followed_to_its_two_hundredth():

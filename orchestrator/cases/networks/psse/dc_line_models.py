@@ -140,6 +140,7 @@ def modelled_lines(
 
 def _modelled(record: DynamicRecord, line: SolvedLine) -> ModelledLine:
     own: dict[str, float | bool] = dict(values_of_record(record, DC_LINE_RECORDS[record.name]))
+    _require_rising_points(record, own)
     device, pole = line.device, line.pole
     at_inverter = {name: own.pop(name) for name in INVERTERS_FIELDS}
     common: dict[str, float | bool] = {"V_dc_0": pole.inverter_kv}
@@ -162,6 +163,17 @@ def _modelled(record: DynamicRecord, line: SolvedLine) -> ModelledLine:
         _station(line, 0, RECTIFIER, at_rectifier),
         _station(line, 1, INVERTER, at_inverter),
     )
+
+
+def _require_rising_points(record: DynamicRecord, own: dict[str, float | bool]) -> None:
+    for first, second in pairwise(("V1", "V2", "V3")):
+        if own[second] <= own[first]:
+            text = (
+                f"{record.name} of the DC line {record.line_of_dc!r} has {second} = {own[second]:g} kV behind {first} "
+                f"= {own[first]:g} kV: {second} must exceed the voltage of the point before it; order the points of "
+                "the current's limit by their voltage"
+            )
+            raise InputError.at(record.place, text)
 
 
 def _station(

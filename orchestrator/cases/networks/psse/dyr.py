@@ -4,6 +4,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from fmus.grid_following.dyr_approximation import FIELDS, MODEL
+from fmus.static_var.held_bus import ELSEWHERE
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.dyr_mistakes import (
     LEAST_STRANGE,
@@ -186,7 +187,8 @@ def _converter(
     values: Mapping[str, float],
     elsewhere: bool,
 ) -> MachineModel:
-    """The model of a converter; ``names``: of its records by kind; ``elsewhere``: whether its plant measures there."""
+    """The model of a converter; ``names``: of its records by kind; ``elsewhere``: whether its plant measures, or
+    it holds a voltage, there."""
     own = dict(values)
     if "shaft" not in parts:
         own.pop(BY_SPEED, None)  # of a shaft that turns at rated speed
@@ -194,6 +196,8 @@ def _converter(
         model, made_of = plant_of(names, elsewhere=elsewhere)
     else:
         model, made_of = parts["converter"], {}
+        if elsewhere:
+            made_of = {"records": f"{names['converter']} {ELSEWHERE}"}
     of_source = SOURCE_IMPEDANCE.get(names["converter"], SOURCE_IMPEDANCE.get(model, ()))
     for name, value in zip(of_source, (machine.source.real, machine.source.imag), strict=False):
         own.setdefault(name, value)

@@ -18,6 +18,7 @@ from orchestrator.cases.networks.psse.machine_model import (
     MANUAL,
     WITHOUT_INERTIA,
 )
+from orchestrator.cases.networks.psse.plant_points import HELD_BUS
 from orchestrator.cases.networks.psse.raw_network import Machine, unit_labels
 from orchestrator.cases.networks.unit_row import DoubtOfRecord, UnitRow, checked
 from orchestrator.core.errors import InputError
@@ -203,6 +204,35 @@ def with_infinite_buses(rows: Sequence[UnitRow], machines: Sequence[Machine]) ->
         else row
         for row in rows
     ]
+
+
+def with_known_buses(
+    rows: Sequence[UnitRow], same: Mapping[int, int], known: Collection[str]
+) -> list[UnitRow]:
+    """The units with compensators that hold the voltage of a bus of the network; else their own, which is asked about.
+
+    ``same``: bus → the one that stands for both; ``known``: names of the buses of the network."""
+    return [_with_known_bus(row, same, known) for row in rows]
+
+
+def _with_known_bus(row: UnitRow, same: Mapping[int, int], known: Collection[str]) -> UnitRow:
+    point = row.measured
+    if point is None or not point.of_voltage:
+        return row
+    bus = same.get(point.bus, point.bus)
+    name = bus_name(str(bus))
+    is_own = name == row.bus
+    if name in known and not is_own:
+        return replace(row, measured=replace(point, bus=bus))
+    text = (
+        f"{point.record} has {HELD_BUS} = {point.bus}, a bus that the network has not, or has out of service: it holds "
+        "the voltage of its own bus instead; correct it, or write 0"
+    )
+    kind = f"{point.record} that holds a bus that is not there"
+    doubt = DoubtOfRecord("held", point.place, text, kind)
+    return replace(
+        row, parts={}, measured=None, doubts=row.doubts if is_own else (*row.doubts, doubt)
+    )
 
 
 def _without_active_power(row: UnitRow) -> UnitRow:

@@ -30,6 +30,15 @@ _SHOWN = 8  # buses that a remark names; the others are counted
 _NEGLIGIBLE = 1e-6  # power [MW, Mvar] of a load of which nothing is left
 _SATURATION = ("SE1", "SE2")
 
+_LEAST_LOADING = 0.3
+"""Active power [pu of its rating] below which a motor's loading is far from usual."""
+
+_MOST_LOADING = 1.3
+"""The same above which it is."""
+
+_USUAL_LOADING = 0.8
+"""Active power [pu of its rating] of a usual motor, by which a rating is proposed."""
+
 
 @dataclass(frozen=True)
 class MotorLoad:
@@ -106,6 +115,31 @@ def motor_remarks(motors: Sequence[MotorLoad], load_mw: float) -> Iterator[Probl
         if saturated:
             text += "; their saturation (SE1, SE2) is left out"
         yield Problem(own[0].record.place, text, topic=QuestionTopic(f"{name} as induction motors"))
+    for motor in motors:
+        loading = motor.drawn.real / motor.parameters["S_n"]
+        if not _LEAST_LOADING <= loading <= _MOST_LOADING:
+            yield Problem(
+                motor.record.place,
+                _of_loading(motor, loading),
+                topic=QuestionTopic("a motor's loading far from usual", motor.name),
+            )
+
+
+def _of_loading(motor: MotorLoad, loading: float) -> str:
+    base, times = (
+        _number_in(motor.record, MOTOR_NAMES[motor.record.name], name)
+        for name in ("MBASE", "PMULT")
+    )
+    rated, p_mw = motor.parameters["S_n"], motor.drawn.real
+    said = (
+        f"MBASE = {base:g} MVA" if base > 0 else f"PMULT = {times:g}, which gives {rated:.4g} MVA"
+    )
+    wanted = f"MBASE, such as {p_mw / _USUAL_LOADING:.3g}" if base > 0 else "PMULT, such as 1.25"
+    return (
+        f"{motor.record.name} has {said} for {p_mw:.4g} MW of load at {bus_of(str(motor.load.bus))}: the motor draws "
+        f"{100 * loading:.3g} % of its rating, and 40 to 120 % are usual; its inertia and its reactances are on that "
+        f"rating. Correct {wanted}"
+    )
 
 
 def _record_for(load: FileLoad, records: Sequence[DynamicRecord]) -> DynamicRecord | None:

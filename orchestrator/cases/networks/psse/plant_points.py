@@ -1,12 +1,16 @@
-"""Points of the network at which the controllers of plants measure."""
+"""Points of the network at which the controllers of plants and static var compensators measure."""
 
 import re
 from collections.abc import Mapping, Sequence
 
 from fmus.grid_following.dyr_approximation import PLANT
+from fmus.static_var.dyr_records import STATIC_VAR_RECORDS
 from orchestrator.cases.networks.measured_point import MeasuredPoint
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.core.errors import InputError
+
+HELD_BUS = "IB"
+"""First field of a compensator's record that may hold another bus' voltage; 0 and its own number are its terminal."""
 
 _PLACES = 4  # first values of REPCA1: the bus and the branch that are measured
 
@@ -16,8 +20,8 @@ def measured_points(
     parts: Mapping[tuple[int, str], Mapping[str, str]],
     problems: list[str],
 ) -> dict[tuple[int, str], MeasuredPoint]:
-    """Return where the controllers of plants measure that do not at their own terminal."""
-    found: dict[tuple[int, str], MeasuredPoint] = {}
+    """Return where the controllers of plants and compensators measure that do not at their own terminal."""
+    found = _held_buses(of, parts, problems)
     for key, record in ((key, r) for key, own in of.items() for r in own if r.name == PLANT):
         if "plant" in parts[key] and len(record.values) >= _PLACES:
             try:
@@ -26,6 +30,31 @@ def measured_points(
                 problems.append(str(error))
                 continue
             found |= {} if point.is_own else {key: point}
+    return found
+
+
+def _held_buses(
+    of: Mapping[tuple[int, str], Sequence[DynamicRecord]],
+    parts: Mapping[tuple[int, str], Mapping[str, str]],
+    problems: list[str],
+) -> dict[tuple[int, str], MeasuredPoint]:
+    """Return the buses whose voltage compensators hold that is not their own."""
+    found: dict[tuple[int, str], MeasuredPoint] = {}
+    for key, record in ((key, r) for key, own in of.items() for r in own):
+        known = STATIC_VAR_RECORDS.get(record.name)
+        if known is None or known.fields[0].name != HELD_BUS or not record.values:
+            continue
+        if parts[key].get(known.kind) != known.part:
+            continue
+        try:
+            bus = number_of_bus(record, HELD_BUS, record.values[0])
+        except InputError as error:
+            problems.append(str(error))
+            continue
+        if bus not in (0, key[0]):
+            found[key] = MeasuredPoint(
+                bus, 0, 0, "", record.place, record=record.name, of_voltage=True
+            )
     return found
 
 

@@ -119,6 +119,15 @@ def read_shunts(net: RawTables, modelled: Collection[tuple[int, str]] = ()) -> N
             net.changes.note(shunt.record.line, "switched shunt: held at BINIT")
         net.add(shunt.bus, 4, complex(0.0, shunt.initial))
         control = shunt_record(shunt.record, net.raw.revision, place)
-        seen = net.standing(control.bus) if control else None
-        if control and seen is not None:
-            net.stepping.append(control.at(shunt.bus, seen))
+        if control is None:
+            continue
+        seen = net.standing(control.bus)
+        if seen is None:
+            text = (
+                f"switched shunt that holds the voltage of bus {control.bus} (SWREM), which the file has not, or has "
+                "out of service: it never steps; correct SWREM, or write 0 for its own bus"
+            )
+            kind = "a switched shunt that holds a bus that is not there"
+            net.changes.note(shunt.record.line, Remark(text, kind))
+            continue
+        net.stepping.append(control.at(shunt.bus, seen))

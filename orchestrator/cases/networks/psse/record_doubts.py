@@ -10,9 +10,6 @@ from orchestrator.cases.networks.psse.raw_network import Machine
 from orchestrator.cases.networks.psse.record_values import CEILING, FLOOR, chosen_ceiling
 from orchestrator.cases.networks.unit_row import DoubtOfRecord
 
-_HELD_BUS = "IB"
-"""Field with the bus whose voltage a compensator holds; 0 and its own number are its terminal."""
-
 _LEAST_SIGNALS = ("uel.V_UIMIN", "uel.V_ULMIN")
 """Lower limits of a limiter's signal [pu]; the higher one counts."""
 
@@ -64,8 +61,7 @@ def _omissions(records: Sequence[DynamicRecord]) -> Iterator[DoubtOfRecord]:
             continue
         given = given_values(record, known.fields, {*KNOWN_RECORDS, *FIELDS})
         for name, text in known.omissions.items():
-            is_own = name == _HELD_BUS and given[name] == record.bus
-            if given[name] and not is_own:
+            if given[name]:
                 said = f"{record.name} has {name} = {given[name]:g}: {text}"
                 kind = f"{record.name} without {name}"
                 yield DoubtOfRecord(known.kind, record.place, said, kind)

@@ -291,11 +291,31 @@ def test_what_cannot_be_is_refused(prepared, text, words):
         prepared(text)
 
 
-def test_points_of_the_currents_limit_that_do_not_rise_are_refused(gfor, prepared, tmp_path):
-    prepared(CDC4T.replace("220 240", "90 240"))
-    code, _, err = gfor("modes", tmp_path / "case.toml")
-    assert code != 0
-    assert "V2 must exceed the voltage of the point before it" in " ".join(err.split())
+def test_points_of_the_currents_limit_that_do_not_rise_are_refused_by_their_line(prepared):
+    text = r"grid\.dyr, line \d+: CDC4T of the DC line 'TIE 1' has V2 = 90 kV behind V1 = 100 kV: V2 must exceed"
+    with pytest.raises(CaseError, match=text):
+        prepared(CDC4T.replace("220 240", "90 240"))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("5 15 0.05", "0.087 0.26 0.05"), ("ALFDY = 0.087", "GAMDY = 0.26")),
+        (("5 15 0.05 0.04", "5 15 50 40"), ("TVDC = 50", "TIDC = 40")),
+        (("0.65 0.1 80", "0.65 100 80"), ("TBLOCK = 100",)),
+    ],
+)
+def test_angles_in_radians_and_times_in_milliseconds_are_asked_about(prepared, change, said):
+    found = texts(prepared(CDC4T.replace(*change)))
+    for one in said:
+        assert one in found
+
+
+def test_a_dc_line_is_lost_by_the_name_that_its_file_gives_it(prepared):
+    elements = Elements.of(prepared())
+    _, named = read_outages("tie 1", elements)
+    _, station = read_outages(RECTIFIER, elements)
+    assert named == station
 
 
 def test_ends_that_do_not_fit_are_refused(prepared):

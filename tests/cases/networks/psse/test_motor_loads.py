@@ -114,6 +114,22 @@ def test_what_motors_are_of_the_load_is_told(tmp_path):
     assert "saturation" not in plain.text
 
 
+@pytest.mark.parametrize(
+    ("record", "said"),
+    [
+        (cim5(base=670), "CIM5BL has MBASE = 670 MVA for 80 MW of load at bus_1: the motor draws"),
+        (cim5(base=50), "draws 160 % of its rating"),
+        (cim5(times=6.7), "CIM5BL has PMULT = 6.7, which gives 536 MVA for 80 MW"),
+        (cim5(base=200), ""),
+        (cim5(times=1.0), ""),
+    ],
+)
+def test_a_rating_that_does_not_fit_the_load_is_asked_about(tmp_path, record, said):
+    first, *others = motor_remarks(motors(tmp_path, f"1 'CIM5BL' 1 {record}"), 200.0)
+    assert "induction motor" in first.text
+    assert [said in " ".join(other.text.split()) for other in others] == [True] * bool(said)
+
+
 RAW = """\
 0, 100.0, 33, 0, 1, 60.0 / a motor behind a line
 A STIFF BUS

@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from orchestrator.cases.case import load_case
 from orchestrator.cases.form.schema import NetworkTable
 from orchestrator.cases.networks.data import network_data
 from tests.cases.networks.psse import raw, records
@@ -111,15 +112,29 @@ def test_a_generator_with_a_compensators_record_is_that_compensator(gfor, tmp_pa
     assert voltage(flow) == pytest.approx(1.02)
 
 
-@pytest.mark.parametrize("name", ["CSVGN4", "CSVGN5"])
-def test_a_compensator_that_holds_another_bus_is_asked_about(gfor, tmp_path, name):
-    code, out, err = gfor(
-        "new", *with_compensator(tmp_path, name, bus=7), "--out", tmp_path / "case.toml", "--json"
-    )
+def prepared_of(gfor, files, folder):
+    code, out, err = gfor("new", *files, "--out", folder / "case.toml", "--json", "--force")
     assert code == 0, err
-    assert f"{name} has IB = 7: it holds the voltage of its own bus instead" in questions_of(
-        json.loads(out)
-    )
+    (prepared,) = load_case(folder / "case.toml").prepare(["base"])
+    return questions_of(json.loads(out)), prepared
+
+
+@pytest.mark.parametrize("name", ["CSVGN4", "CSVGN5"])
+def test_a_compensator_holds_the_bus_that_its_record_names(gfor, tmp_path, name):
+    asked, prepared = prepared_of(gfor, with_compensator(tmp_path, name, bus=7), tmp_path)
+    assert "IB" not in asked
+    v_7 = abs(prepared.power_flow.voltages["bus_7"])
+    assert prepared.values["gfor8.held.v_0"] == pytest.approx(v_7)
+    assert v_7 != pytest.approx(1.02, abs=1e-3)
+    ends = {(str(x.source), str(x.target)) for x in prepared.system.connections}
+    assert ("grid.bus_7.v", "gfor8.held.v") in ends
+
+
+@pytest.mark.parametrize("name", ["CSVGN4", "CSVGN5"])
+def test_a_compensator_that_names_a_bus_that_is_not_there_holds_its_own(gfor, tmp_path, name):
+    asked, prepared = prepared_of(gfor, with_compensator(tmp_path, name, bus=77), tmp_path)
+    assert f"{name} has IB = 77, a bus that the network has not" in asked
+    assert not [name for name in prepared.values if "held" in name]
 
 
 SVSMO1 = """
@@ -246,3 +261,17 @@ def test_a_model_of_a_shunt_that_is_not_there_is_asked_about(gfor, tmp_path):
     )
     assert code == 0, err
     assert "SVSMO1T2 (bus 7) is of no machine and not used" in questions_of(json.loads(out))
+
+
+@pytest.mark.parametrize("revision", [33, 35])
+@pytest.mark.parametrize(("remote", "told"), [(99, True), (7, False), (0, False)])
+def test_a_switched_shunt_that_holds_a_bus_that_is_not_there_is_told(
+    tmp_path, revision, remote, told
+):
+    found = records(revision)
+    shunt = SHUNTS[revision].replace("8,2,0,1,", "8,1,0,1,").replace("'A ',2,", "'A ',1,")
+    found["SWITCHED SHUNT"] += [shunt.replace("1.02,1.02,0,", f"1.02,0.98,{remote},", 1)]
+    (tmp_path / "grid.raw").write_text(raw(revision, found))
+    changes = network_data(NetworkTable(raw="grid.raw"), tmp_path).changes
+    said = " ".join(" ".join(change.text.split()) for change in changes)
+    assert (f"holds the voltage of bus {remote} (SWREM), which the file has not" in said) == told
