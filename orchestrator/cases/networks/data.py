@@ -160,11 +160,7 @@ def network_data(
     ]
     in_file = _lines_of_file(directory / table.lines_file) if table.lines_file is not None else []
     lines += [line for line, _ in in_file]
-    if table.loads_file is not None:
-        for row in rows_of(directory / table.loads_file, ("bus", "p_mw", "q_mvar")):
-            bus = bus_name(row["bus"])
-            load = Load(f"load_{row['bus']}", bus, number(row, "p_mw"), number(row, "q_mvar"))
-            loads.append(with_laws(load, table))
+    loads += _loads_of_file(table, directory)
     sequences = _sequences(found, table, directory, [*source.lines])
     buses = dict.fromkeys((*source.buses, *table.buses))
     if not buses:  # no list of buses to check the lines' ends against: the ends define the buses
@@ -211,6 +207,18 @@ def network_data(
         dc_lines=found.dc_lines,
         merged=found.raw.same if found.raw else {},
     )
+
+
+def _loads_of_file(table: NetworkTable, directory: Path) -> list[Load]:
+    """Return the loads of the table's file; none without one."""
+    if table.loads_file is None:
+        return []
+    rows = rows_of(directory / table.loads_file, ("bus", "p_mw", "q_mvar"))
+    loads = (
+        Load(f"load_{row['bus']}", bus_name(row["bus"]), number(row, "p_mw"), number(row, "q_mvar"))
+        for row in rows
+    )
+    return [with_laws(load, table) for load in loads]
 
 
 def _sequences(

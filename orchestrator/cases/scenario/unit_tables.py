@@ -26,6 +26,7 @@ from orchestrator.cases.networks.conversion import Generation
 from orchestrator.cases.networks.data import bus_name
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, read_dyr
 from orchestrator.cases.networks.psse.dyr_units import (
+    at_their_devices,
     completed,
     missing_records,
     rows_of_machines,
@@ -292,7 +293,7 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> tuple[list[UnitRow], Sequen
     alphas = _alphas(draft, table, rows)
     replaced = [row.label for row in rows if alphas[row.label] == 1]
     idle = draft.data.idle_machines if draft.data else ()
-    records = read_dyr(path)
+    records = at_their_devices(read_dyr(path), machines)
     keys = [(machine.bus, machine.name.strip()) for machine in machines]
     ours = {key for key, row in zip(keys, rows, strict=True) if row.label in table.replace}
     rows = with_records(

@@ -30,6 +30,9 @@ NUMBERED = ("VTGTPAT", "VTGDCAT", "FRQTPAT", "FRQDCAT")
 OF_SHUNTS = {"SVSMO1T2": False, "SVSMO1T3": True}
 """Models of switched shunts, and whether the shunt's identifier follows the name: it does from revision 35 on."""
 
+OF_FACTS = ("CSTCNT",)
+"""Records of a FACTS device that are its model."""
+
 ONLY_SHUNT = "1"
 """Identifier of a switched shunt where there is only one at a bus."""
 
@@ -50,7 +53,9 @@ class DynamicRecord:
     name: str
     machine: str
     values: tuple[str, ...]
-    line_of_dc: str = ""  # name of the DC line that a record is of, in the place of its bus
+    line_of_dc: str = (
+        ""  # name of the DC line or FACTS device that a record is of, in the place of its bus
+    )
 
     @property
     def place(self) -> str:
@@ -89,6 +94,11 @@ def read_dyr(path: Path) -> list[DynamicRecord]:
     return records
 
 
+def facts_name(device: str) -> str:
+    """Return what a FACTS device's unit is called beside machines at its bus, which have short names of their own."""
+    return f"facts {device.strip().casefold()}"
+
+
 def shunt_name(identifier: str) -> str:
     """Return what a switched shunt's unit is called beside machines at its bus, which have short names of their own."""
     return f"shunt {identifier}"
@@ -99,7 +109,8 @@ def _record(file: str, line: int, tokens: Sequence[str], names: int) -> DynamicR
         return DynamicRecord(file, line, 0, EVENT, tokens[2], tuple(tokens[3:]))
     if names > 1 and not tokens[0].isdigit() and _MODEL.fullmatch(tokens[1]):
         name, values = tokens[1].upper(), tuple(tokens[2:])
-        return DynamicRecord(file, line, 0, name, "", values, line_of_dc=tokens[0])
+        unit = facts_name(tokens[0]) if name in OF_FACTS else ""
+        return DynamicRecord(file, line, 0, name, unit, values, line_of_dc=tokens[0])
     if len(tokens) < 3 or not re.fullmatch(r"\d{1,9}", tokens[0]):
         raise InputError.at(
             f"{file}, line {line}",

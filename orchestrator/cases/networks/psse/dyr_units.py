@@ -9,7 +9,7 @@ from fmus.synchronous_generator.dyr_records import MACHINE_VARIANTS
 from orchestrator.cases.form.unusual_value import UnusualValue
 from orchestrator.cases.networks.data import bus_name
 from orchestrator.cases.networks.psse.dyr import machine_models
-from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
+from orchestrator.cases.networks.psse.dyr_file import OF_FACTS, DynamicRecord
 from orchestrator.cases.networks.psse.limiter_records import LIMITERS
 from orchestrator.cases.networks.psse.machine_model import (
     CLASSICAL,
@@ -206,6 +206,19 @@ def with_infinite_buses(rows: Sequence[UnitRow], machines: Sequence[Machine]) ->
     ]
 
 
+def at_their_devices(
+    records: Sequence[DynamicRecord], machines: Sequence[Machine]
+) -> list[DynamicRecord]:
+    """The records, those that name a FACTS device as of the unit that stands for it."""
+    units = {machine.name: machine.bus for machine in machines}
+    return [
+        replace(record, bus=units[record.machine], line_of_dc="")
+        if record.name in OF_FACTS and record.machine in units
+        else record
+        for record in records
+    ]
+
+
 def with_known_buses(
     rows: Sequence[UnitRow], same: Mapping[int, int], known: Collection[str]
 ) -> list[UnitRow]:
@@ -264,11 +277,15 @@ def with_records(
             of_records = replace(row, parameters=own, parts=model.parts, partial=model.partial)
             found.append(replace(of_records, doubts=model.doubts, lines=model.lines))
         else:
-            own = {"gfor": model.parameters}
+            of_converter = dict(model.parameters)
+            rating = of_converter.pop(
+                "S_n", row.rating_mva
+            )  # of a record that says its base itself
             found.append(
                 replace(
                     _without_active_power(row) if model.converter in COMPENSATORS else row,
-                    parameters=own,
+                    rating_mva=rating,
+                    parameters={"gfor": of_converter},
                     parts=model.parts,
                     converter=model.converter,
                     replaced=model.replaced,

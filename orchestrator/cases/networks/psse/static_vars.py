@@ -7,6 +7,8 @@ from collections.abc import Collection, Iterator
 from dataclasses import replace
 
 from fmus.static_var.dyr_records import STATIC_VAR_RECORDS
+from orchestrator.cases.networks.psse.devices import HeldDevice
+from orchestrator.cases.networks.psse.dyr_file import facts_name
 from orchestrator.cases.networks.psse.facts_devices import FactsDevice
 from orchestrator.cases.networks.psse.raw_loads import switched_shunts
 from orchestrator.cases.networks.psse.raw_network import Machine
@@ -20,7 +22,7 @@ _SOURCE = 1j  # ZSORCE where a record does not say it [pu of the rating]
 _NO_LIMIT = 9999.0  # MVA by which PSS/E says that a device has no limit
 
 Modelled = Collection[tuple[int, str]]
-"""Bus and identifier of such records."""
+"""Bus and identifier of such records; 0 and the name of its unit of one that names its FACTS device."""
 
 
 def units_of_devices(
@@ -42,30 +44,50 @@ def units_of_devices(
     of_bus = {bus: name for bus, name in modelled if (bus, name) not in there | shunts}
     kept = []
     for device in net.devices.devices:
-        is_shunt = isinstance(device, FactsDevice) and not device.terminal and not device.is_remote
-        if not isinstance(device, FactsDevice) or not is_shunt or device.sending not in of_bus:
+        name = _unit_of(device, of_bus, modelled)
+        if not isinstance(device, FactsDevice) or name is None:
             kept.append(device)
             continue
         bus = device.sending
+        held = net.magnitudes[bus] if device.is_remote else device.v_pu
+        what = "the file's voltage" if device.is_remote else "VSET"
         most = device.most_mva if device.most_mva < _NO_LIMIT else net.raw.base_mva
         text = (
-            f"FACTS device with a record of its model at bus {bus}: a unit of 0 MW that holds VSET, with that model on "
-            f"{most:g} MVA (SHMX, in the place of a generator's MBASE)"
+            f"FACTS device with a record of its model at bus {bus}: a unit of 0 MW that holds {what}, with "
+            f"that model on {_base_of(name, most)}"
         )
         net.modelled.add(device.line)
         net.changes.note(device.line, Remark(text, "a FACTS device with a record of its model"))
         yield Machine(
             bus,
-            of_bus.pop(bus),
+            name,
             device.line,
             p_mw=0.0,
-            v_pu=device.v_pu,
+            v_pu=held,
             rating_mva=most,
             source=_SOURCE,
             q_min_mvar=-most,
             q_max_mvar=most,
         )
     net.devices = replace(net.devices, devices=tuple(kept))
+
+
+def _unit_of(device: HeldDevice, of_bus: dict[int, str], modelled: Modelled) -> str | None:
+    """Return the name of the unit that a device's record makes of it, by the device's name or its bus; None for none.
+
+    ``of_bus``: records at buses that are of no machine, of which one is taken."""
+    if not isinstance(device, FactsDevice) or device.terminal:
+        return None
+    own = facts_name(device.name)
+    if (0, own) in modelled:
+        return own
+    return None if device.is_remote else of_bus.pop(device.sending, None)
+
+
+def _base_of(unit: str, most: float) -> str:
+    if unit.startswith(facts_name("")):
+        return "STBASE of that record"
+    return f"{most:g} MVA (SHMX, in the place of a generator's MBASE)"
 
 
 def units_of_shunts(net: RawTables, modelled: Modelled) -> Iterator[Machine]:

@@ -103,12 +103,12 @@ def test_models_of_dc_lines_are_passed_over_and_asked_about(tmp_path):
 
 def test_a_model_of_a_facts_device_says_whose_it_is_and_why_it_is_not_used(tmp_path):
     records = read(
-        tmp_path, CLASSICAL + "'F 1' 'CSTCNT' 0 0.0 0.1 0.0 25 0.03 9 -9 1 1 0.2 1.2 0.1 0.5 /\n"
+        tmp_path, CLASSICAL + "'F 1' 'SVSMO3T2' 0 0.0 0.1 0.0 25 0.03 9 -9 1 1 0.2 1.2 0.1 0.5 /\n"
     )
     uses = record_uses(records, {(bus, "1") for bus in (1, 2, 3)}, ())
     assert uses[-1].why == "a model of the FACTS device 'F 1', which is of no machine"
     (question,) = (str(question) for question in unused_models(records, uses))
-    assert "CSTCNT (FACTS device F 1) is of no machine and not used" in question
+    assert "SVSMO3T2 (FACTS device F 1) is of no machine and not used" in question
     assert "no public source gives the order of its fields" in " ".join(question.split())
 
 

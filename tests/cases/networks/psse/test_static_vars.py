@@ -83,6 +83,29 @@ def with_compensator(folder, name, bus=8):
     return folder / "grid.raw", folder / "grid.dyr"
 
 
+CSTCNT = "'f 1' 'CSTCNT' {bus} 0.0 0.0 0.1 0.0 25.0 0.03 99 -99 1.2 1.2 0.2 1.3 0.1 0.5 {base} /\n"
+
+
+@pytest.mark.parametrize(("bus", "remote"), [(0, 0), (8, 0), (7, 0), (7, 7)])
+def test_a_facts_devices_own_record_makes_it_a_static_condenser(gfor, folder, bus, remote):
+    """On STBASE, at VSET or, where the file lets it hold another bus, at the file's voltage."""
+    text = (folder / "grid.raw").read_text()
+    line = lines_of("FACTS DEVICE", 33)[0]
+    assert line in text
+    fields = [*line.split(","), *["0"] * 20][:20]
+    fields[19] = str(remote)
+    (folder / "grid.raw").write_text(text.replace(line, ",".join(fields)))
+    (folder / "grid.dyr").write_text(MACHINES + CSTCNT.format(bus=bus, base=50))
+    asked, prepared = prepared_of(gfor, (folder / "grid.raw", folder / "grid.dyr"), folder)
+    assert "no machine" not in asked
+    plan = prepared.system.components["gfor8"]
+    assert (plan.number("S_n"), plan.number("ICMAX"), plan.number("DROOP")) == (50, 1.2, 0.03)
+    is_elsewhere = bus == 7
+    assert plan.description.model_name == f"cstatt_{'elsewhere_' if is_elsewhere else ''}phasor"
+    wanted = 1.0 if remote else 1.03
+    assert abs(prepared.power_flow.voltages["bus_8"]) == pytest.approx(wanted)
+
+
 def power_flow(gfor, case):
     code, out, err = gfor("modes", case, "--scenario", "base", "--json")
     assert code == 0, err
