@@ -36,6 +36,7 @@ _VOLTAGE = 0.4
 """Reactive work beside dissipating work from which on an oscillation acts through voltage, and energy flow points
 elsewhere."""
 
+_LEAST_TOLD = 0.005  # part that is not told as 0 %
 _CERTAIN = 3.0  # standard errors by which a figure must exceed zero
 _BLOCK_PERIODS = 4  # periods of the oscillation that a block has at least
 _MOST_BLOCKS = 8
@@ -52,6 +53,12 @@ class Opinion:
     ranking: tuple[tuple[str, float], ...]
     # whether nothing else drives, which phasors alone never tell: what drives may take energy
     alone: bool = False
+
+    @property
+    def others_give(self) -> bool:
+        """Whether the places take more than they give, so that parts of what is given say little."""
+        taken = -sum(share for _, share in self.ranking if share < 0)
+        return _BALANCE * taken > 1.0
 
 
 @dataclass(frozen=True)
@@ -77,12 +84,12 @@ class _Work:
             both = ", ".join(f"{n} {100 * x:.0f} %" for n, x in ranking[:3] if x > 0)
             return Opinion(method, None, True, f"several places {verb[:-1]} it: {both}", ranking)
         if fed < _BALANCE * taken:
+            part = f"{100 * fed / taken:.0f}" if fed > _LEAST_TOLD * taken else "less than 1"
             return Opinion(
                 method,
                 None,
                 True,
-                f"{name} {verb} only {100 * fed / taken:.0f} % of what is taken: "
-                "another place feeds, perhaps outside of what is observed",
+                f"what {verb} it is not among the places that are observed: they give {part} % of what they take",
                 ranking,
             )
         return Opinion(method, name, True, f"{name} {verb} {100 * share:.0f} % of it", ranking)

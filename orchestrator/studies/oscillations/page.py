@@ -5,12 +5,18 @@ from html import escape
 
 import numpy as np
 
+from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import number_of
 from orchestrator.output.report.colours import colour
 from orchestrator.output.report.html.charts import ChartCurve, legend, line_chart
 from orchestrator.output.report.html.elements import SHADES, Figures, document
 from orchestrator.output.report.html.network_map import network_map
-from orchestrator.studies.oscillations.detection import envelope, signals_of, spectra
+from orchestrator.studies.oscillations.detection import (
+    SpectralLine,
+    envelope,
+    signals_of,
+    spectra,
+)
 from orchestrator.studies.oscillations.location import works
 from orchestrator.studies.oscillations.measurements import Measurements
 from orchestrator.studies.oscillations.tables import opinions_table
@@ -18,6 +24,8 @@ from orchestrator.studies.oscillations.verdict import Located
 
 _LEAST_FLOW = 0.02  # part of the largest energy flow below which a branch has no arrow
 _CURVES = 3
+_MEGAWATTS = 100.0  # [MW] that a measurement's base is
+_LINE_WIDTH = 0.01  # of the largest value: two pixels of a chart
 
 
 def source_page(measured: Measurements, found: list[Located]) -> str:
@@ -51,22 +59,42 @@ def _chapter(
 ) -> Iterator[str]:
     yield opinions_table("What each method says", one).html()
     yield _map(measured, one, [x.found.frequency for x in found if x is not one], figures)
-    signals = signals_of(measured)
-    curves = []
-    for k, name in enumerate([n for n in one.found.amplitudes if n.endswith(".p")][:_CURVES]):
-        z, half = envelope(
-            signals.times, signals.values[:, signals.names.index(name)], one.found.frequency
-        )
-        curves.append(
-            ChartCurve(
-                name, colour(k + 1), signals.times[half : len(signals.times) - half], np.abs(z)
-            )
-        )
+    curves = envelope_curves(measured, one.found)
     if curves:
         chart = legend((c.label, c.colour) for c in curves) + line_chart(
-            "timeline", "Time [s]", "Amplitude", curves
+            "timeline", "Time [s]", "Amplitude [MW]", curves
         )
         yield figures.add(chart, "Amplitude over the time, of the powers that show it best.")[0]
+
+
+def envelope_curves(measured: Measurements, found: SpectralLine) -> list[ChartCurve]:
+    """Amplitudes over the time of the powers that show a line best [MW]; equal ones are one curve with all names.
+
+    A machine and its transformer, or two lines side by side, carry the same power: one of two such curves would hide
+    the other.
+    """
+    signals = signals_of(measured)
+    named: list[tuple[list[str], Numbers]] = []
+    half = 0
+    for name in [n for n in found.amplitudes if n.endswith(".p")]:
+        values = signals.values[:, signals.names.index(name)]
+        z, half = envelope(signals.times, values, found.frequency)
+        size = np.abs(z) * _MEGAWATTS / measured.base
+        same = next((names for names, other in named if _lie_together(size, other)), None)
+        if same is not None:
+            same.append(name)
+        elif len(named) < _CURVES:
+            named.append(([name], size))
+    times = signals.times[half : len(signals.times) - half]
+    return [
+        ChartCurve(" = ".join(names), colour(k + 1), times, size)
+        for k, (names, size) in enumerate(named)
+    ]
+
+
+def _lie_together(one: Numbers, other: Numbers) -> bool:
+    """Return whether two curves are nowhere further apart than the width of a line."""
+    return bool(np.abs(one - other).max() <= _LINE_WIDTH * max(one.max(), other.max()))
 
 
 def _map(measured: Measurements, one: Located, others: list[float], figures: Figures) -> str:

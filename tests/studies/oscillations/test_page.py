@@ -1,0 +1,60 @@
+"""The page on a source: every curve that is named is seen, and parts are parts of something."""
+
+import numpy as np
+import pytest
+
+from orchestrator.studies.oscillations.location import DEF, QV_PHASE, Opinion
+from orchestrator.studies.oscillations.page import envelope_curves
+from orchestrator.studies.oscillations.tables import parts_of
+from orchestrator.studies.oscillations.verdict import locate
+from tests.support.forced_records import record, sine, times_of
+
+TIMES = times_of(40.0)
+
+
+@pytest.fixture(scope="module")
+def forced():
+    """A record of two areas in which a governor is forced, and what is found in it."""
+    measured = record("two_area", {"sg1.governor.delta_P_ref": sine(TIMES, 0.8, 0.02)}, times=TIMES)
+    return measured, locate(measured)[0]
+
+
+def test_each_curve_differs_from_the_others_and_all_names_stand_beside_them(forced):
+    """Two of three curves once lay on each other: a machine's power is that of its transformer."""
+    measured, one = forced
+    curves = envelope_curves(measured, one.found)
+    largest = max(curve.y.max() for curve in curves)
+    for k, curve in enumerate(curves):
+        for other in curves[:k]:
+            assert np.abs(curve.y - other.y).max() > 1e-3 * largest
+    powers = [name for name in one.found.amplitudes if name.endswith(".p")]
+    named = [name for curve in curves for name in curve.label.split(" = ")]
+    assert named
+    assert len(named) == len(set(named))
+    assert set(named) <= set(powers)
+
+
+def test_an_amplitude_is_in_megawatts_for_any_base(forced):
+    measured, one = forced
+    (first, *_) = envelope_curves(measured, one.found)
+    place = next(p for p in measured.places if f"{p.name}.p" == first.label.split(" = ")[0])
+    settled = place.p[len(TIMES) // 2 :]
+    assert np.median(first.y) == pytest.approx(
+        100 / measured.base * np.sqrt(2) * settled.std(), rel=0.1
+    )
+
+
+@pytest.mark.parametrize(
+    ("ranking", "words"),
+    [
+        ([("a", 0.97), ("b", 0.03), ("c", 0.001), ("d", -0.4)], "a 97 %, b 3 %"),
+        # 100 % of nearly nothing: all others take 300 times as much
+        ([("a", 1.0), ("b", -100.0), ("c", -200.0)], "these places take more than they give"),
+        ([("a", -1.0)], "none"),
+    ],
+)
+def test_parts_of_what_is_given(ranking, words):
+    given = Opinion(QV_PHASE if len(ranking) == 3 else DEF, None, True, "", tuple(ranking))
+    if ranking == [("a", -1.0)]:  # takes alone: nobody gives
+        assert given.others_give is False
+    assert parts_of(given) == words
