@@ -189,14 +189,14 @@ def _figures(v: PointVerdict) -> Iterator[str]:
 GB = "gb"  # the code of Great Britain, which has figures and no verdict
 ALL = "all"  # every code
 FREQUENCY = BEHAVIOUR  # the name of voltage source behaviour in frequency, among the codes
-_CODES = (*WITH_VERDICT, GB, FREQUENCY)
-LISTED = ", ".join(map(in_words, _CODES))  # as the help of ``--code`` names them
+CODES = (*WITH_VERDICT, GB, FREQUENCY)
+LISTED = ", ".join(map(in_words, CODES))  # as the help of ``--code`` names them
 
 
 def read_code(text: str) -> str:
-    if text in (*_CODES, ALL):
+    if text in (*CODES, ALL):
         return text
-    near = " or ".join(like(text, _CODES))
+    near = " or ".join(like(text, CODES))
     raise ValueError(
         f"{text!r} is no code; {f'did you mean {near}?' if near else f'give one of {LISTED}, or {ALL}'}"
     )

@@ -1,15 +1,36 @@
-"""``gfor completion``: the text that a shell needs to complete commands, options, cases and files."""
+"""``gfor completion``: the text that a shell needs to complete commands, options, cases, scenarios, codes and files."""
 
 import argparse
+import tomllib
+from pathlib import Path
 
-from orchestrator.cases.case import built_in_cases
+from orchestrator.cases.case import BUILT_IN, built_in_cases
+from orchestrator.systems.coupling.no_trip_regions import NO_TRIP_REGIONS, read_no_trip_code
 
 SHELLS = ("bash", "zsh", "fish")
+
+_IN_FILE = r"""sed -n 's/^\[scenarios\.\([A-Za-z0-9_-]*\).*/\1/p' "$1" 2>/dev/null | sort -u"""
+"""Prints the scenarios that a case file has."""
+
+_IN_POSIX = """\
+_gfor_scenarios_of() {{
+  case "$1" in
+{lines}
+    *.toml) {in_file} ;;
+  esac
+}}
+"""
 
 _IN_BASH = """\
 _gfor_cases() {{
   compgen -W "{cases}" -- "$1"
   compgen -f -- "$1"
+}}
+_gfor_scenarios() {{
+  local word
+  for word in "${{COMP_WORDS[@]}}"; do
+    compgen -W "$(_gfor_scenarios_of "$word")" -- "$1"
+  done
 }}
 """
 
@@ -18,13 +39,34 @@ _gfor_cases() {{
   compadd {cases}
   _files
 }}
+_gfor_scenarios() {{
+  local word
+  for word in $words; do
+    compadd -- $(_gfor_scenarios_of "$word")
+  done
+}}
 """
 
-_IN_FISH = "(string split ' ' -- '{cases}'; __fish_complete_path (commandline -ct))"
-"""fish has no function of ours: it runs these words for each completion."""
+_IN_FISH = """\
+function _gfor_scenarios
+  for word in (commandline -opc)
+    switch $word
+{lines}
+      case '*.toml'
+        {in_file}
+    end
+  end
+end
+"""
+
+_CASES_IN_FISH = "(string split ' ' -- '{cases}'; __fish_complete_path (commandline -ct))"
+"""fish runs these words for each completion."""
 
 _FOLDERS = ("DIR", "FOLDER")
 """Metavariables of the arguments that take a folder."""
+
+_FILES = ("FILE.fmu", "DEVICE", "NETWORK", "vendor.toml", "[NAME=]FILE")
+"""Metavariables of the arguments that take a file or something else, so that they are not read as a path."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,22 +78,53 @@ def run(options: argparse.Namespace) -> int:
     import shtab  # noqa: PLC0415 - no other command needs it
 
     from orchestrator.face.cli import whole_parser  # noqa: PLC0415 - it imports every command
+    from orchestrator.face.cli.certificate import ALL, CODES, read_code  # noqa: PLC0415 - as above
 
     parser = whole_parser()
     cases = " ".join(built_in_cases())
-    of_cases = {"bash": "_gfor_cases", "zsh": "_gfor_cases", "fish": _IN_FISH.format(cases=cases)}
+    words = {read_code: (*CODES, ALL), read_no_trip_code: (*NO_TRIP_REGIONS,)}
+    of_cases = _in_shells("_gfor_cases", _CASES_IN_FISH.format(cases=cases))
+    of_scenarios = _in_shells("_gfor_scenarios", "(_gfor_scenarios)")
     for action in _actions_of(parser):
         if action.choices is not None or action.nargs == 0:
             continue
-        if action.metavar == "CASE":
+        if action.type in words:
+            action.choices = words[action.type]
+        elif action.metavar == "CASE":
             action.complete = of_cases  # type: ignore[attr-defined]  # shtab's own attribute
+        elif "--scenario" in action.option_strings:
+            action.complete = of_scenarios  # type: ignore[attr-defined]
         elif action.metavar in _FOLDERS:
             action.complete = shtab.DIRECTORY  # type: ignore[attr-defined]
-        else:
+        elif action.type is Path or action.metavar in _FILES:
             action.complete = shtab.FILE  # type: ignore[attr-defined]
-    preamble = {"bash": _IN_BASH, "zsh": _IN_ZSH}.get(options.shell, "").format(cases=cases)
+    preamble = _preamble(options.shell, cases)
     print(shtab.complete(parser, options.shell, root_prefix="_gfor", preamble=preamble))
     return 0
+
+
+def _in_shells(function: str, in_fish: str) -> dict[str, str]:
+    return {"bash": function, "zsh": function, "fish": in_fish}
+
+
+def _preamble(shell: str, cases: str) -> str:
+    """Return the functions that offer cases, and the scenarios of the case that the line names."""
+    names = {case: " ".join(_scenarios_of(case)) for case in built_in_cases()}
+    if shell == "fish":
+        lines = "\n".join(
+            f"      case {case}\n        string split ' ' -- '{found}'"
+            for case, found in names.items()
+        )
+        return _IN_FISH.format(lines=lines, in_file=_IN_FILE.replace("$1", "$word"))
+    lines = "\n".join(f'    {case}) echo "{found}" ;;' for case, found in names.items())
+    own = {"bash": _IN_BASH, "zsh": _IN_ZSH}[shell].format(cases=cases)
+    return _IN_POSIX.format(lines=lines, in_file=_IN_FILE) + own
+
+
+def _scenarios_of(case: str) -> list[str]:
+    """Return the scenarios of a built-in case, without reading its network."""
+    table = tomllib.loads((BUILT_IN / case / "case.toml").read_text(encoding="utf-8"))
+    return [*table.get("scenarios", ())]
 
 
 def _actions_of(parser: argparse.ArgumentParser) -> list[argparse.Action]:

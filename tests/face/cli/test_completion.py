@@ -26,7 +26,9 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("completion")
     with (folder / "completions").open("w", encoding="utf-8") as file, redirect_stdout(file):
         assert main(["completion", "bash"]) == 0
-    (folder / "own_case.toml").touch()
+    (folder / "own_case.toml").write_text(
+        "[components.grid]\n[scenarios.windy]\n[scenarios.windy.set]\n[scenarios.calm]\n", "utf-8"
+    )
     return folder
 
 
@@ -51,6 +53,14 @@ def complete(folder, words):
         ("gfor modes own", {"own_case.toml"}),
         ("gfor modes two_area --schedule mid", {"midpoint"}),
         ("gfor completion fi", {"fish"}),
+        ("gfor modes two_area --scenario pod_", {"pod_p", "pod_q", "pod_pq"}),
+        ("gfor modes own_case.toml --scenario ''", {"windy", "calm"}),
+        ("gfor modes missing.toml --scenario ''", set()),
+        ("gfor certify gfor.fmu --code nts", {"nts631"}),
+        ("gfor run two_area --protection ''", {"prc029"}),
+        ("gfor run two_area --stop ''", set()),
+        ("gfor modes own_case.toml --set ''", set()),
+        ("gfor fmu check --binding own", {"own_case.toml"}),
     ],
 )
 def test_bash_offers(folder, words, offered):
