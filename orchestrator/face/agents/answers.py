@@ -152,5 +152,9 @@ class ExplanationAnswer(BaseModel):
     stable: bool | None
     verdict: str
     because: list[str] = Field(
-        description="one sentence each: what decides, who takes part, what else to know"
+        description="what decides, one sentence each: the modes that grow, or else the least damped one, and who takes "
+        "part in it; or why the verdict is not known"
+    )
+    doubts: list[str] = Field(
+        description="warnings, and questions about the input, to look at before the verdict is believed"
     )

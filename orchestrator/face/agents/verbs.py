@@ -43,6 +43,9 @@ VERBS = (
 MOST_ROWS = 20
 """Modes, buses, parameters or states that an answer lists: more than a reader compares, and few enough for an agent."""
 
+MOST_DECIDING = 3
+"""Growing modes that an explanation names, the least damped first."""
+
 MOST_FILES = 200
 """Case files that `cases` lists."""
 
@@ -180,14 +183,14 @@ class Verbs:
         """Explain a scenario's verdict: what decides, who takes part, and what to look at before it is believed."""
         found = self._ask("modes", case, scenario, values)
         (one,) = found["scenarios"]
-        because = [_sentence(mode) for mode in one["modes"][:3]]
-        because += [*one["warnings"], *(f"question: {text}" for text in found["questions"])]
         stability = one["stability"]
+        because = [stability["reason"], *map(_sentence, _deciding(one))]
         return ExplanationAnswer(
             scenario=one["name"],
             stable=one["stable"],
             verdict=stability["sentence"],
-            because=[text for text in [stability["reason"], *because] if text],
+            because=[text for text in because if text],
+            doubts=_first([*one["warnings"], *found["questions"]]),
         )
 
     def _ask(
@@ -335,6 +338,17 @@ def _screened(mode: Mapping[str, Any]) -> ScreenedModeAnswer:
 def _strength(row: Mapping[str, Any]) -> float:
     """Return by how much a percent of the value moves the damping; values of 0 come last."""
     return abs(float(row["damping_points_per_percent"] or 0.0))
+
+
+def _deciding(one: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return the listed modes that decide a scenario's verdict: those that grow, or else the least damped one.
+
+    There is none where the verdict is not known, or rests on growth outside of the listed frequencies, which its
+    sentence tells."""
+    ordered = sorted(one["modes"], key=lambda mode: float(mode["damping_percent"]))
+    if one["stable"] is False:
+        return [mode for mode in ordered if mode["real"] > 0][:MOST_DECIDING]
+    return ordered[:1] if one["stable"] else []
 
 
 def _sentence(mode: Mapping[str, Any]) -> str:

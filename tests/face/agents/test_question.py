@@ -6,8 +6,9 @@ import sys
 
 import pytest
 
+import orchestrator as gfor
 from orchestrator.face.agents.question import Allowance, NoAnswerError, ask
-from orchestrator.face.agents.verbs import Verbs
+from orchestrator.face.agents.verbs import Verbs, _deciding
 
 WITHIN = """
 import json, os, sys
@@ -157,4 +158,26 @@ def test_an_explanation_names_who_swings(tmp_path):
     told = Verbs(allowance(tmp_path)).explain("two_area", "base")
     assert told.stable is False
     assert told.verdict.startswith("UNSTABLE")
-    assert "sg1" in told.because[0] or "sg1" in told.because[1]
+    (why,) = told.because  # one mode grows; the two that are damped decide nothing
+    assert "sg1" in why
+    assert "-0.9" in why
+    assert told.doubts == []
+
+
+def test_a_stable_scenario_is_explained_by_its_least_damped_mode(tmp_path):
+    told = Verbs(allowance(tmp_path)).explain("two_area", "pod_p")
+    (least, *_) = sorted(
+        gfor.load("two_area").scenario("pod_p").modes(), key=lambda mode: mode.damping_percent
+    )
+    (why,) = told.because
+    assert f"the mode of {least.frequency_hz:.3f} Hz" in why
+
+
+def test_what_grows_elsewhere_is_not_explained_by_a_damped_swing():
+    swing = {"damping_percent": 3.0, "real": -0.1}
+    listed = {"modes": [swing], "stable": False}
+    assert _deciding(listed) == []
+    assert _deciding(listed | {"stable": True}) == [swing]
+    assert _deciding(listed | {"stable": None}) == []
+    growing = {"damping_percent": -2.0, "real": 0.1}
+    assert _deciding({"modes": [swing, growing], "stable": False}) == [growing]
