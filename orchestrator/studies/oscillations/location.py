@@ -56,7 +56,7 @@ class Opinion:
 
     @property
     def others_give(self) -> bool:
-        """Whether the places take more than they give, so that parts of what is given say little."""
+        """True if the places take more than they give: parts of what is given say little then."""
         taken = -sum(share for _, share in self.ranking if share < 0)
         return _BALANCE * taken > 1.0
 
