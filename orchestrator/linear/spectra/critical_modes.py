@@ -17,7 +17,7 @@ from orchestrator.core.errors import AnalysisError
 from orchestrator.core.threads import one_thread
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra import modes as spectra
-from orchestrator.linear.spectra.block_arnoldi import MOST, TOLERANCE, BlockArnoldi
+from orchestrator.linear.spectra.block_arnoldi import MOST, TOLERANCE, WIDTHS, BlockArnoldi
 from orchestrator.linear.spectra.left_vectors import left_vectors
 from orchestrator.linear.spectra.region_cells import RegionCell
 
@@ -209,8 +209,7 @@ class Search:
         ``radius``: distance from ``centre`` [rad/s].
         ``wanted``: whether an eigenvalue λ is looked for."""
         if self._solver.takes_many:
-            self._blocks = BlockArnoldi(self._solver.solve, len(self._model.names))
-            return self._reaching_in_blocks(self._blocks, radius, wanted)
+            return self._found_in_blocks(lambda found: self._knows(found, radius, wanted))
         return self._reaching_one_by_one(radius)
 
     def covering(
@@ -222,7 +221,6 @@ class Search:
         if not self._solver.takes_many:
             values = self._reaching_one_by_one(radius)
             return (None, self._values) if values is None else (cell, values)
-        self._blocks = blocks = BlockArnoldi(self._solver.solve, len(self._model.names))
         known: list[RegionCell] = []
         least = _LEAST_PART * _ENOUGH
 
@@ -236,7 +234,7 @@ class Search:
             known.append(part)
             return True
 
-        values = self._values_within(blocks) if _grow(blocks, is_enough) else None
+        values = self._found_in_blocks(is_enough)
         return (None, self._values) if values is None else (known[-1], values)
 
     def _known_part(
@@ -285,12 +283,18 @@ class Search:
             for k in chosen
         ]
 
-    def _reaching_in_blocks(
-        self, blocks: BlockArnoldi, radius: float, wanted: Callable[[complex], bool]
+    def _found_in_blocks(
+        self, enough: Callable[[BlockArnoldi], bool]
     ) -> NDArray[np.complex128] | None:
-        if not _grow(blocks, lambda found: self._knows(found, radius, wanted)):
-            return None
-        return self._values_within(blocks)
+        """Eigenvalues up to `reach`; None where they are too many. Equal ones are looked for with more vectors."""
+        for width in WIDTHS:
+            blocks = BlockArnoldi(self._solver.solve, len(self._model.names), width=width)
+            self._blocks = blocks
+            if not _grow(blocks, enough):
+                return None
+            if self._are_complete(blocks):
+                return self._values
+        return None
 
     def _knows(
         self, blocks: BlockArnoldi, radius: float, wanted: Callable[[complex], bool]
@@ -305,11 +309,11 @@ class Search:
 
         return blocks.knows_all_beyond(1 / self.reach, may_be_wanted)
 
-    def _values_within(self, blocks: BlockArnoldi) -> NDArray[np.complex128] | None:
-        """Eigenvalues up to `reach`; None where one is there so often that there may be more of it."""
+    def _are_complete(self, blocks: BlockArnoldi) -> bool:
+        """Take the eigenvalues up to `reach`; none of them is there so often that there may be more of it."""
         count = int((np.abs(blocks.values) >= 1 / self.reach).sum())
         self._values = self._to_lambda(blocks.values[:count])
-        return self._values if blocks.is_complete(count) else None
+        return blocks.is_complete(count)
 
     def _pairs_of_blocks(
         self, blocks: BlockArnoldi, chosen: list[int]
@@ -321,16 +325,17 @@ class Search:
             left = left_vectors(self._model, self.sigma, wanted)
             found = None if left is None else self._both_sides(wanted, left, right)
             if found is None or not self._are_left(*found[:2]):
-                found = self._both_sides(wanted, self._left_by_search(wanted), right)
+                found = self._both_sides(wanted, self._left_by_search(wanted, blocks.width), right)
         if found is None:
             raise self._not_converging
         nu, left, right = found
         values = self._to_lambda(nu)
         return [(complex(values[k]), left[:, k], right[:, k]) for k in range(len(chosen))]
 
-    def _left_by_search(self, wanted: NDArray[np.complex128]) -> Vector:
-        """Left eigenvectors of some ν by a search in the adjoint equations."""
-        adjoint = BlockArnoldi(self._solver.solve_adjoint, len(self._model.names), 2 * MOST)
+    def _left_by_search(self, wanted: NDArray[np.complex128], width: int) -> Vector:
+        """Left eigenvectors of some ν by a search in the adjoint equations, with as many vectors at once."""
+        size = len(self._model.names)
+        adjoint = BlockArnoldi(self._solver.solve_adjoint, size, 2 * MOST, width=width)
         if not _grow(adjoint, lambda found: _partners(found, wanted) is not None):
             raise self._not_converging
         return adjoint.vectors(_partners(adjoint, wanted) or ())

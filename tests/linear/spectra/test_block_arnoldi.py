@@ -11,7 +11,7 @@ from orchestrator.core.errors import AnalysisError
 from orchestrator.linear.models import hub_elimination, linear_model
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra import critical_modes
-from orchestrator.linear.spectra.block_arnoldi import WIDTH, BlockArnoldi
+from orchestrator.linear.spectra.block_arnoldi import WIDTHS, BlockArnoldi
 from orchestrator.linear.spectra.critical_modes import Search, find_critical_modes
 from orchestrator.linear.spectra.modes import find_modes
 from tests.linear.models.test_hub_elimination import UNSTABLE, system
@@ -46,7 +46,7 @@ def test_vectors_stay_orthogonal_where_little_of_them_is_new():
     near = np.eye(SIZE) + 1e-7 * rng.standard_normal((SIZE, SIZE)) / np.sqrt(SIZE)
     search = BlockArnoldi(lambda vectors: near @ vectors, SIZE, most=96)
     assert search.grow()
-    known = search._basis[:, : search._done + WIDTH]
+    known = search._basis[:, : search._done + search.width]
     assert abs(known.conj().T @ known - np.eye(known.shape[1])).max() < 1e-13
 
 
@@ -87,7 +87,7 @@ def test_the_step_map_has_the_same_modes(in_blocks, whole):
 
 def test_a_crowd_that_is_too_large_for_the_vectors_is_cut(in_blocks, monkeypatch):
     crowd = [complex(-0.09 * w, w) for w in np.linspace(6.0, 6.6, 40)]
-    monkeypatch.setattr(BlockArnoldi.__init__, "__defaults__", (5 * WIDTH,))
+    monkeypatch.setattr(BlockArnoldi.__init__, "__defaults__", (10 * WIDTHS[0],))
     searched = []
     monkeypatch.setattr(
         critical_modes, "Search", lambda *given: searched.append(given[1]) or Search(*given)
@@ -123,9 +123,27 @@ def test_equal_and_nearly_equal_modes_are_all_found_with_vectors_of_their_own(in
 
 def test_a_mode_that_is_there_more_often_than_can_be_seen_is_refused(in_blocks):
     mode = complex(-0.2, 5.0)
-    assert len(find_critical_modes(model(*[mode] * (WIDTH - 1)), 0.79, 0.81, 0.1)) == WIDTH - 1
+    most = WIDTHS[-1]
+    assert len(find_critical_modes(model(*[mode] * (most - 1)), 0.79, 0.81, 0.1)) == most - 1
     with pytest.raises(AnalysisError, match="modes lie at"):
-        find_critical_modes(model(*[mode] * (WIDTH + 4)), 0.79, 0.81, 0.1)
+        find_critical_modes(model(*[mode] * (most + 4)), 0.79, 0.81, 0.1)
+
+
+@pytest.mark.parametrize("often", [WIDTHS[0] - 1, WIDTHS[0], WIDTHS[0] + 1])
+def test_modes_as_often_there_as_vectors_at_once_are_looked_for_with_more(
+    often, in_blocks, monkeypatch
+):
+    """Four vectors show four of five equal modes, and nothing else tells that there is a fifth."""
+    widths = []
+    made = BlockArnoldi.__init__
+    monkeypatch.setattr(
+        BlockArnoldi,
+        "__init__",
+        lambda self, *given, width: widths.append(width) or made(self, *given, width=width),
+    )
+    found = find_critical_modes(model(*[complex(-0.2, 5.0)] * often), 0.79, 0.81, 0.1)
+    assert len(found) == often
+    assert (WIDTHS[-1] in widths) == (often >= WIDTHS[0])
 
 
 def blocks_with(values, accuracy):
@@ -160,13 +178,11 @@ def test_a_disc_is_known_only_where_all_that_matters_has_settled(values, accurac
 
 
 @pytest.mark.parametrize(("real", "known"), [(-0.51, False), (-0.6, True)])
-def test_a_rough_value_beside_the_region_may_lie_in_it(real, known, in_blocks, monkeypatch):
-    monkeypatch.setattr(BlockArnoldi, "grow", lambda self: False)
+def test_a_rough_value_beside_the_region_may_lie_in_it(real, known, in_blocks):
     search = Search(model(complex(-0.2, 5.0)), 5j)
     beside = [1 / (complex(real, 5.0) - 5j), *(1 / (-9.0 - k) for k in range(8))]
     blocks = blocks_with(beside, [5e-3, *[1e-3] * 8])
-    found = search._reaching_in_blocks(blocks, 1.0, lambda value: value.real > -0.5)
-    assert (found is not None) is known
+    assert search._knows(blocks, 1.0, lambda value: value.real > -0.5) is known
 
 
 def test_an_adjoint_that_is_another_systems_is_noticed(in_blocks, monkeypatch):
