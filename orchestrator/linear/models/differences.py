@@ -58,24 +58,31 @@ class PerturbedStep:
 
         ``size``: of the perturbation, relative to max(1, |value|); ``rates`` are read before the step; ``unstepped``:
         those of ``varied`` after which no step is done; the caller gives their columns of d(x⁺)."""
-        component, names = self.component, self.names
+        (found,) = self.differences_of_sizes(varied, (size,), rates, unstepped)
+        return found
+
+    def differences_of_sizes(
+        self,
+        varied: Sequence[int],
+        sizes: Sequence[float],
+        rates: Sequence[str] = (),
+        unstepped: Collection[int] = (),
+    ) -> tuple[Differences, ...]:
+        """The same for several sizes, whose moves are made one after the other without a look at Python between."""
+        component = self.component
         moved, after, outputs = self._batches
         slopes = RealBatch(component, rates)
-        values = moved.read()[list(varied)]
-        sizes = size * np.maximum(1.0, np.abs(values))
-        signs = [
-            _allowed_signs(component, names[place], value, step)
-            for place, value, step in zip(varied, values.tolist(), sizes.tolist(), strict=True)
-        ]
-        first = np.array([each[0] for each in signs])
-        both = np.flatnonzero([len(each) == 2 for each in signs])
-        stepped = np.array([place not in unstepped for place in varied], dtype=bool)
         places = np.array(varied, dtype=np.int64)
+        values = moved.read()[places]
+        stepped = np.array([place not in unstepped for place in varied], dtype=bool)
+        turns = [self._turns(places, values, size) for size in sizes]
+        each = [turn.moves(places, values, stepped) for turn in turns]
+        moved_places, targets, steps = (np.concatenate(part) for part in zip(*each, strict=True))
         moves = Moves(
             moved,
-            np.concatenate([places, places[both]]),
-            np.concatenate([values + first * sizes, values[both] - sizes[both]]),
-            np.concatenate([stepped, stepped[both]]),
+            moved_places,
+            targets,
+            steps,
             before=(outputs, slopes),
             after=after,
             time=self.time,
@@ -88,13 +95,33 @@ class PerturbedStep:
         finally:
             component.restore_state(saved)
             component.free_state(saved)
-        every = zip((answers.after, *answers.before), at_rest, strict=True)
-        columns, upwards = zip(
-            *(_quotients(each, rest, first, sizes, both) for each, rest in every), strict=True
-        )
-        for column in (columns[0], upwards[0]):
-            column[~stepped] = 0.0
-        return Differences(*(column.T for column in (*columns, *upwards)))
+        found, first = [], 0
+        for turn in turns:
+            own = slice(first, first + turn.count)
+            answered = (answers.after[own], *(batch[own] for batch in answers.before))
+            every = zip(answered, at_rest, strict=True)
+            columns, upwards = zip(*(turn.quotients(*one) for one in every), strict=True)
+            for column in (columns[0], upwards[0]):
+                column[~stepped] = 0.0
+            found.append(Differences(*(column.T for column in (*columns, *upwards))))
+            first += turn.count
+        return tuple(found)
+
+    def _turns(self, places: NDArray[np.int64], values: Vector, size: float) -> "_Turns":
+        """Both directions of each variable, but one alone where a parameter's bounds allow no other."""
+        sizes = size * np.maximum(1.0, np.abs(values))
+        first, both = np.ones(len(places)), np.ones(len(places), dtype=bool)
+        for k in np.flatnonzero(self._bounded[places]).tolist():
+            name = self.names[places[k]]
+            signs = _allowed_signs(self.component, name, float(values[k]), float(sizes[k]))
+            first[k], both[k] = signs[0], len(signs) == 2
+        return _Turns(sizes, first, np.flatnonzero(both))
+
+    @cached_property
+    def _bounded(self) -> NDArray[np.bool_]:
+        """Which variables are parameters."""
+        variables = self.component.description.variables
+        return np.array([variables[name].causality == "parameter" for name in self.names], bool)
 
     @cached_property
     def _batches(self) -> tuple[RealBatch, RealBatch, RealBatch]:
@@ -111,7 +138,7 @@ class PerturbedStep:
         self.component.step(self.time, self.step_size)
         after.read()
         self.component.restore_state(saved)
-        return after.values.copy(), outputs.values.copy(), slopes.values
+        return after.values.copy(), outputs.values.copy(), slopes.values.copy()
 
     def moves_at_rest(self) -> bool:
         """Return whether a step from the operating point itself changes a state by more than `RESTS`."""
@@ -177,32 +204,50 @@ class PerturbedStep:
             component.free_state(saved)
 
 
-def _quotients(
-    answers: Matrix, at_rest: Vector, first: Vector, sizes: Vector, both: NDArray[np.int64]
-) -> tuple[Matrix, Matrix]:
-    """Central difference quotients, and those of the first direction alone; a row for each variable.
+@dataclass(frozen=True)
+class _Turns:
+    """How far each variable is moved in its first direction, and those that are moved in the other one as well."""
 
-    Answers are those in the first direction, then those in the other of the variables that have ``both``."""
-    count = len(sizes)
-    other = np.empty((count, len(at_rest)))
-    other[:] = at_rest
-    other[both] = answers[count:]
-    width = sizes.copy()
-    width[both] *= 2
-    central = np.subtract(answers[:count], other, out=other)
-    central *= first[:, None]
-    central /= width[:, None]
-    one_sided = answers[:count] - at_rest
-    one_sided *= first[:, None]
-    one_sided /= sizes[:, None]
-    return central, one_sided
+    sizes: Vector
+    first: Vector  # 1 or −1
+    both: NDArray[np.int64]
+
+    @property
+    def count(self) -> int:
+        """Number of moves."""
+        return len(self.sizes) + len(self.both)
+
+    def moves(
+        self, places: NDArray[np.int64], values: Vector, steps: NDArray[np.bool_]
+    ) -> tuple[NDArray[np.int64], Vector, NDArray[np.bool_]]:
+        """Places, values and whether a step follows: all in the first direction, then some in the other."""
+        both, there = self.both, values + self.first * self.sizes
+        return (
+            np.concatenate([places, places[both]]),
+            np.concatenate([there, values[both] - self.sizes[both]]),
+            np.concatenate([steps, steps[both]]),
+        )
+
+    def quotients(self, answers: Matrix, at_rest: Vector) -> tuple[Matrix, Matrix]:
+        """Central difference quotients, and those of the first direction alone; a row for each variable."""
+        count, first, both = len(self.sizes), self.first[:, None], self.both
+        other = np.empty((count, len(at_rest)))
+        other[:] = at_rest
+        other[both] = answers[count:]
+        width = self.sizes.copy()
+        width[both] *= 2
+        central = np.subtract(answers[:count], other, out=other)
+        central *= first
+        central /= width[:, None]
+        one_sided = answers[:count] - at_rest
+        one_sided *= first
+        one_sided /= self.sizes[:, None]
+        return central, one_sided
 
 
 def _allowed_signs(component: Component, name: str, value: float, step: float) -> tuple[float, ...]:
     """Directions of a perturbation that stay within a parameter's declared bounds; both, where none does."""
     info = component.description.variables[name]
-    if info.causality != "parameter":
-        return (+1.0, -1.0)
     above = info.maximum is None or value + step <= info.maximum
     below = info.minimum is None or value - step >= info.minimum
     return tuple(sign for sign, within in ((+1.0, above), (-1.0, below)) if within) or (+1.0, -1.0)

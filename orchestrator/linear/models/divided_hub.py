@@ -80,13 +80,13 @@ class DividedHub:
     def taken_in(self, x: Vector) -> Vector:
         """R·x, for the entered places' x, shape (k, c)."""
         found = np.zeros((len(self.hub), x.shape[1]), dtype=x.dtype)
-        _take_in(self.whole, x[self.entered], found)
+        _take_in(self.whole, _numbers(x[self.entered]), _numbers(found))
         return _put_back(found, self.hub)
 
     def given_out(self, y: Vector) -> Vector:
         """Rᵀ·y at the entered places, for y of shape (h, c)."""
         found = np.zeros((len(self.entered), y.shape[1]), dtype=y.dtype)
-        _give_out(self.whole, y[self.hub], found)
+        _give_out(self.whole, _numbers(y[self.hub]), _numbers(found))
         return _put_back(found, self.entered)
 
     def at(self, sigma: complex, inside: sp.csc_array) -> "DividedFactors":
@@ -164,14 +164,13 @@ def _factors(part: _Part, shift: Vector, inside: sp.csr_array) -> "_Whole | _Tie
     if part.halves is None or part.ties is None:
         assert part.among is not None
         assert part.taken is not None
-        own = inside[part.entered][:, part.hub]
-        schur = part.among - _dense_times(part.taken, own)
+        schur = part.among - _dense_times(part.taken, _within(inside, part))
         schur[np.diag_indices_from(schur)] -= shift[part.hub]
         return _Whole(scipy.linalg.lu_factor(schur, overwrite_a=True, check_finite=False))
     halves = part.halves
     first, second = (_factors(half, shift, inside) for half in halves)
     V = [
-        tie.hub - _dense_times(tie.entered, inside[other.entered][:, other.hub])
+        tie.hub - _dense_times(tie.entered, _within(inside, other))
         for tie, other in zip(part.ties, reversed(halves), strict=True)
     ]
     X = first.solve(part.ties[0].left + 0j), second.solve(part.ties[1].left + 0j)
@@ -184,29 +183,39 @@ def _factors(part: _Part, shift: Vector, inside: sp.csr_array) -> "_Whole | _Tie
     return _Tied((first, second), cut, X, (V[0], V[1]), lu)
 
 
+def _within(inside: sp.csr_array, part: _Part) -> sp.csr_array:
+    """The rows of a part; they have no columns elsewhere, as no group is parted."""
+    first, last = part.entered.start, part.entered.stop
+    begin, end = inside.indptr[first], inside.indptr[last]
+    rows = inside.indptr[first : last + 1] - begin
+    columns = inside.indices[begin:end] - part.hub.start
+    shape = (last - first, part.hub.stop - part.hub.start)
+    return sp.csr_array((inside.data[begin:end], columns, rows), shape=shape)
+
+
 def _dense_times(dense: Matrix, inside: sp.csr_array) -> Matrix:
     return np.asarray((inside.T @ dense.T).T)
 
 
-def _take_in(part: _Part, x: Vector, found: Vector) -> None:
-    """Add R·x to what is found, both in the order of the parts."""
+def _take_in(part: _Part, x: Matrix, found: Matrix) -> None:
+    """Add R·x to what is found, both real and in the order of the parts."""
     if part.taken is not None:
-        found[part.hub] += times(part.taken, x[part.entered])
+        found[part.hub] += part.taken @ x[part.entered]
         return
     assert part.halves is not None
     for tie, half, other in zip(part.ties or (), part.halves, reversed(part.halves), strict=True):
-        found[half.hub] += times(tie.left, times(tie.entered, x[other.entered]))
+        found[half.hub] += tie.left @ (tie.entered @ x[other.entered])
         _take_in(half, x, found)
 
 
-def _give_out(part: _Part, y: Vector, found: Vector) -> None:
+def _give_out(part: _Part, y: Matrix, found: Matrix) -> None:
     """Add Rᵀ·y likewise."""
     if part.taken is not None:
-        found[part.entered] += times(part.taken.T, y[part.hub])
+        found[part.entered] += part.taken.T @ y[part.hub]
         return
     assert part.halves is not None
     for tie, half, other in zip(part.ties or (), part.halves, reversed(part.halves), strict=True):
-        found[other.entered] += times(tie.entered.T, times(tie.left.T, y[half.hub]))
+        found[other.entered] += tie.entered.T @ (tie.left.T @ y[half.hub])
         _give_out(half, y, found)
 
 
@@ -214,6 +223,11 @@ def _put_back(ordered: Vector, order: Places) -> Vector:
     found = np.empty_like(ordered)
     found[order] = ordered
     return found
+
+
+def _numbers(vectors: Vector) -> Matrix:
+    """The real and imaginary parts of vectors beside each other, without a copy where they lie row by row."""
+    return np.ascontiguousarray(vectors).view(float)
 
 
 def times(real: Matrix | sp.csr_array, vector: Vector) -> Vector:
@@ -260,8 +274,10 @@ def divide(
     cuts = np.cumsum([0, *map(len, leaves)])
     edges = [np.searchsorted(place[of][o], cuts) for of, o in ((owner, hub), (taker, entered))]
     T, R = T[np.ix_(hub, hub)], R[np.ix_(hub, entered)]
-    others = T - np.diag(np.diag(T))
-    scale = np.sqrt((others**2).sum(axis=1) + (R**2).sum(axis=1))
+    own = T.diagonal().copy()
+    np.fill_diagonal(T, 0.0)
+    scale = np.sqrt(sum(np.einsum("ij,ij->i", matrix, matrix) for matrix in (T, R)))
+    np.fill_diagonal(T, own)
     builder = _Builder(T, R, np.where(scale > 0, scale, 1.0), edges)
     whole = builder.part(0, len(leaves))
     if whole.size > _WORTH * (T.size + R.size):
@@ -316,17 +332,28 @@ class _Builder:
 def _nearness(T: Matrix, R: Matrix, owner: Places, taker: Places) -> Matrix:
     """How much each group takes of each other, as parts of what it takes."""
     groups = int(owner.max()) + 1
-    into, into_taker = (
-        sp.coo_array((np.ones(len(of)), (of, np.arange(len(of)))), shape=(groups, len(of)))
-        for of in (owner, taker)
-    )
-    size = np.abs(T).max(axis=1, keepdims=True, initial=0.0)
-    size = np.maximum(size, np.abs(R).max(axis=1, keepdims=True, initial=0.0))
+    size = np.maximum(_largest(T), _largest(R))
     size[size == 0] = 1.0
-    among = (into @ (np.abs(T) / size)) @ into.T + (into @ (np.abs(R) / size)) @ into_taker.T
-    found = np.asarray(among)
+    into = sp.csr_array((1 / size, (owner, np.arange(len(owner)))), shape=(groups, len(owner)))
+    found = np.asarray(into @ (_sums(T, owner, groups) + _sums(R, taker, groups)))
     sums = np.linalg.norm(found, axis=1, keepdims=True)
     return found / np.where(sums > 0, sums, 1.0)
+
+
+def _largest(matrix: Matrix) -> Vector:
+    """Return the largest size in each row."""
+    return np.maximum(matrix.max(axis=1, initial=0.0), -matrix.min(axis=1, initial=0.0))
+
+
+def _sums(matrix: Matrix, of: Places, groups: int) -> Matrix:
+    """Sums of the sizes in each row, by the group of the columns."""
+    order = np.argsort(of, kind="stable")
+    numbers, first = np.unique(of[order], return_index=True)
+    ordered = np.take(matrix, order, axis=1)
+    found = np.zeros((len(matrix), groups))
+    if len(order):
+        found[:, numbers] = np.add.reduceat(np.abs(ordered, out=ordered), first, axis=1)
+    return found
 
 
 def _leaves(near: Matrix, sizes: Places) -> list[Places]:

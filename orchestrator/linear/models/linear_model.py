@@ -208,19 +208,19 @@ class Equations:
 
     def __init__(self, n: int, m: int) -> None:
         self._shapes = {"F": (n, n), "G": (n, m), "H": (m, n), "K": (m, m)}
+        self._states = np.arange(n)
         self._parts: dict[str, list[tuple[Places, Places, Matrix]]] = {
             name: [] for name in self._shapes
         }
 
     def next_state(self, rows: slice, states: slice, A: Matrix, w: Indices, B: Matrix) -> None:
         """Add z⁺[rows] = A·z[states] + B·w[w]."""
-        n = self._shapes["F"][0]
-        self._add("F", np.arange(n)[rows], np.arange(n)[states], A)
-        self._add("G", np.arange(n)[rows], w, B)
+        self._add("F", self._states[rows], self._states[states], A)
+        self._add("G", self._states[rows], w, B)
 
     def output(self, rows: Indices, states: slice, C: Matrix, w: Indices, D: Matrix) -> None:
         """Add w[rows] = C·z[states] + D·w[w]."""
-        self._add("H", rows, np.arange(self._shapes["F"][0])[states], C)
+        self._add("H", rows, self._states[states], C)
         self._add("K", rows, w, D)
 
     def _add(self, name: str, rows: Indices, columns: Indices, block: Matrix) -> None:

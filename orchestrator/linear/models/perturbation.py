@@ -44,9 +44,8 @@ def perturb(step: PerturbedStep, rates: Sequence[str], *, once: bool = False) ->
         return PerturbationResult(alone, alone, alone, {}, step.names)
     columns: Sequence[int] = range(len(names))
     # The derivatives need no second size: they are differenced over no step.
-    found = differences_by_rates(step, PERTURBATIONS[0], with_slopes=bool(rates)) or (
-        step.differences(columns, PERTURBATIONS[0], rates),
-        step.differences(columns, 2 * PERTURBATIONS[0]),
+    found = differences_by_rates(step, PERTURBATIONS[0], with_slopes=bool(rates)) or _with_both(
+        step, columns, PERTURBATIONS[0], rates
     )
     usual = Differences(*(part.copy() for part in found[1]))
     answers = _answers(step, found, columns, PERTURBATIONS[0])
@@ -56,7 +55,7 @@ def perturb(step: PerturbedStep, rates: Sequence[str], *, once: bool = False) ->
     for size in PERTURBATIONS[1:]:
         if not columns:
             break
-        again = step.differences(columns, size, rates), step.differences(columns, 2 * size)
+        again = _with_both(step, columns, size, rates)
         answers = _answers(step, again, columns, size)
         one_sided.take_back(columns, answers)
         disagree = answers.disagree
@@ -66,6 +65,16 @@ def perturb(step: PerturbedStep, rates: Sequence[str], *, once: bool = False) ->
         columns = _those_of(columns, disagree)
     doubtful = tuple(name for k, name in enumerate(names) if k in columns or one_sided.now[k])
     return PerturbationResult(*found, usual, narrow, doubtful)
+
+
+def _with_both(
+    step: PerturbedStep, columns: Sequence[int], size: float, rates: Sequence[str]
+) -> tuple[Differences, Differences]:
+    """Differences with a size and with twice that size; rates are read with the first alone."""
+    if rates:
+        return step.differences(columns, size, rates), step.differences(columns, 2 * size)
+    small, large = step.differences_of_sizes(columns, (size, 2 * size))
+    return small, large
 
 
 def _answers(

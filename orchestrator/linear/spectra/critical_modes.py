@@ -69,6 +69,10 @@ _BESIDE = 1e-7
 """An eigenvalue nearer to the point than this part of it drowns the others' digits: 1e-11 rad/s away they were off by
 6e-7 rad/s, on it by 1.5e-3. The point moves then."""
 
+_OF_LEFT = 1e-8
+"""Part of ν that left eigenvectors may leave over where they are searched: few vectors at once end no further than they
+are asked to."""
+
 _SMALLEST = 1e-4  # smallest size of a cell of the region, relative to its distance from 0
 # how far into instability the region reaches: to this negative damping ratio
 _UNSTABLE_MARGIN = 0.1
@@ -415,7 +419,7 @@ def _grow(blocks: BlockArnoldi, enough: Callable[[BlockArnoldi], bool]) -> bool:
 
 def _partners(blocks: BlockArnoldi, wanted: NDArray[np.complex128]) -> list[int] | None:
     """Places of the settled values of the adjoint equations that are those wanted, one for each; None if one lacks."""
-    settled = np.flatnonzero(blocks.accuracy <= TOLERANCE)
+    settled = np.flatnonzero(blocks.accuracy <= _OF_LEFT)
     if len(settled) < len(wanted):
         return None
     apart = (

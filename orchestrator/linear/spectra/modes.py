@@ -302,7 +302,7 @@ def make_mode(
     scaled = left / overlap.conjugate() if overlap else left
     return Mode(
         complex(value),
-        tuple(zip((names[k] for k in order.tolist()), factors[order].tolist(), strict=True)),
+        tuple(zip(map(names.__getitem__, order.tolist()), factors[order].tolist(), strict=True)),
         ReadOnlyTable(zip(names, shape.tolist(), strict=True)),
         ReadOnlyTable(zip(names, scaled.tolist(), strict=True)),
     )

@@ -7,6 +7,7 @@ from orchestrator.core.errors import ComponentError
 from orchestrator.devices.fmi.component import RealBatch
 from orchestrator.linear.models import answers_to_moves as module
 from orchestrator.linear.models.answers_to_moves import Moves, answers_to_moves
+from orchestrator.linear.models.differences import PerturbedStep
 from orchestrator.linear.models.linearization import Blocks
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.schedule import gauss_seidel
@@ -67,6 +68,23 @@ def test_each_move_begins_where_the_component_rests(lag, way, monkeypatch):
     assert found.before[0][:, 0].tolist() == [0.5, 0.3, 0.5, 0.3]
     assert found.before[1][:, 0] == pytest.approx([-0.2 / T, 0.4 / T] * 2, rel=1e-12)
     assert RealBatch(lag, ("x", "u")).read().tolist() == [0.3, 0.3]
+
+
+def test_answers_to_one_side_are_measured_from_rest(lag, way):
+    """The lag is linear: what it answers upwards alone is its rate's derivative."""
+    step = PerturbedStep(lag, ("u",), ("y",), 0.0, H)
+    found = step.differences(range(2), 1e-5, lag.description.rates)
+    assert found.slopes_up[0] == pytest.approx([-1 / T, 1 / T], rel=1e-8)
+    assert found.outputs_up[0] == pytest.approx([1.0, 0.0], rel=1e-8)
+
+
+def test_two_sizes_at_once_are_what_each_gives(lag, way):
+    step, sizes = PerturbedStep(lag, ("u",), ("y",), 0.0, H), (1e-5, 2e-5)
+    both = step.differences_of_sizes(range(2), sizes)
+    for one, size in zip(both, sizes, strict=True):
+        for part, alone in zip(one, step.differences(range(2), size), strict=True):
+            assert np.array_equal(part, alone)
+    assert not np.array_equal(both[0].after, both[1].after)
 
 
 def test_a_call_that_fails_is_named(lag, way):

@@ -114,9 +114,9 @@ def searches(monkeypatch):
     begun = []
 
     class Counted(BlockArnoldi):
-        def __init__(self, *given):
+        def __init__(self, *given, **named):
             begun.append(given)
-            super().__init__(*given)
+            super().__init__(*given, **named)
 
     monkeypatch.setattr(critical_modes, "BlockArnoldi", Counted)
     return begun
