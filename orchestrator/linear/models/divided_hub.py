@@ -342,7 +342,8 @@ def _nearness(T: Matrix, R: Matrix, owner: Places, taker: Places) -> Matrix:
 
 def _largest(matrix: Matrix) -> Vector:
     """Return the largest size in each row."""
-    return np.maximum(matrix.max(axis=1, initial=0.0), -matrix.min(axis=1, initial=0.0))
+    highest, lowest = matrix.max(axis=1, initial=0.0), matrix.min(axis=1, initial=0.0)
+    return np.asarray(np.maximum(highest, -lowest))
 
 
 def _sums(matrix: Matrix, of: Places, groups: int) -> Matrix:
