@@ -20,7 +20,8 @@ PARTS = ("machine", "exciter", "governor", "stabilizer", "oel", "uel")
 """Keys of a component's table, of ``[units]`` and columns of its file that choose the parts of a generator."""
 
 RECORDS = "records"
-"""Key of a component's table that names PSS/E's records of which a plant of WECC's generic models is made."""
+"""Key of a component's table that names PSS/E's records of which a plant of WECC's generic models, or a static var
+compensator, is made."""
 
 CHOICES = (*PARTS, RECORDS)
 """Keys of a component's table that choose what its model is made of."""

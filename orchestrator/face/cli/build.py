@@ -90,7 +90,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         f"--{RECORDS}",
         metavar="NAMES",
-        help="PSS/E's records that wecc_plant_phasor is made of, such as 'REGCB1 REECC1 REPCA1'",
+        help="PSS/E's records that wecc_plant_phasor is made of, such as 'REGCB1 REECC1 REPCA1', or a compensator's, "
+        "such as 'CSVGN5 elsewhere'",
     )
 
 

@@ -1,4 +1,4 @@
-"""Two-terminal DC lines with a record of their control, CDC4T: a rectifier's and an inverter's station with models.
+"""Two-terminal DC lines with a record of their control, CDC4T or CDC6T: a station with a model at each end.
 
 The RAW file has the line with its converters and set points, the DYR file its control under the line's name. The line
 starts in the state that the power flow's solution has. Taps stay, as in PSS/E's dynamics."""
@@ -14,7 +14,7 @@ from fmus.grid.element_data import Load
 from orchestrator.cases.form.remedies import without_models
 from orchestrator.cases.networks.psse.device_flow import SolvedDevices
 from orchestrator.cases.networks.psse.devices import HeldDevice, Voltages
-from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, given_values
 from orchestrator.cases.networks.psse.record_values import values_of_record
 from orchestrator.cases.networks.psse.two_terminal import CURRENT, Pole, TwoTerminal
 from orchestrator.core.errors import InputError, Problem, QuestionTopic, few, number_of
@@ -220,7 +220,7 @@ def remarks_of_lines(lines: Sequence[ModelledLine]) -> Iterator[Problem]:
             )
             kind = "an end of a DC line beyond the part that is studied"
             yield Problem(one.record.place, text, topic=QuestionTopic(kind, one.line.name))
-        for kind, text in _doubts(one):
+        for kind, text in (*_doubts(one), *_omissions(one.record)):
             said = f"{one.record.name} of the DC line {one.line.name!r}: {text}"
             yield Problem(one.record.place, said, topic=QuestionTopic(kind, one.line.name))
 
@@ -265,6 +265,20 @@ def _doubts(one: ModelledLine) -> Iterator[tuple[str, str]]:
             "ever acts. Is it in per unit? Write kV, or 0 for none"
         )
         yield "a DC line whose VBYPAS may be in per unit", text
+
+
+def _omissions(record: DynamicRecord) -> Iterator[tuple[str, str]]:
+    """Yield kinds and texts of what the model leaves out of a record, by the fields that ask for it."""
+    known = DC_LINE_RECORDS[record.name]
+    given = given_values(record, known.fields, DC_LINE_RECORDS)
+    asked = [
+        f"{name} = {given[name]:g}: {text}" for name, text in known.omissions.items() if given[name]
+    ]
+    if asked:
+        yield (
+            f"{record.name} without what it adds to CDC4T",
+            f"left out in a run: {'; '.join(asked)}",
+        )
 
 
 def _limit_of_current(p: dict[str, float | bool], kilovolts: float) -> float:

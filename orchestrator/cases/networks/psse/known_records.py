@@ -121,7 +121,7 @@ def known_records() -> list[KnownRecord]:
         for name, record in DISTRIBUTED_RECORDS.items()
     ]
     found += [
-        KnownRecord(name, "device (DC line)", record.part, _DC_LINES, _OF_LINE)
+        KnownRecord(name, "device (DC line)", record.part, _DC_LINES, _of_line(record))
         for name, record in DC_LINE_RECORDS.items()
     ]
     found += [
@@ -138,6 +138,11 @@ def known_records() -> list[KnownRecord]:
 
 
 _BY_HAND = "its diagram's equations, by hand"
+
+
+def _of_line(record: DyrRecord) -> str:
+    """Return what is approximated of a DC line, and which of its interruptions are left out."""
+    return "; ".join((_OF_LINE, *_limits(record)))
 
 
 def _peers() -> dict[str, str]:

@@ -311,6 +311,28 @@ def test_angles_in_radians_and_times_in_milliseconds_are_asked_about(prepared, c
         assert one in found
 
 
+CDC6T = CDC4T.replace("CDC4T", "CDC6T").replace(" /", " {} /")
+OF_CDC6T = "{vrb} 0.1 0.05 0 0.02 0 0.1 0 0 0.04"
+
+
+def test_cdc6t_is_cdc4t_and_asks_about_what_it_adds(prepared):
+    plain = prepared().system.components[RECTIFIER].parameters
+    ready = prepared(CDC6T.format(OF_CDC6T.format(vrb=0.8)))
+    assert ready.system.components[RECTIFIER].parameters == plain
+    said = texts(ready)
+    assert "CDC6T: 1 DC line with the model of its record, 60 MW" in said
+    assert "VRB = 0.8: the line does not block after a time below this voltage" in said
+    assert "TRUB = 0.05: the line comes back" in said
+    assert "VIB" not in said
+    nothing = prepared(CDC6T.format("0 0.1 0 0 0.02 0 0.1 0 0 0.04"))
+    assert "left out in a run" not in texts(nothing)
+
+
+def test_cdc6t_with_the_fields_of_cdc4t_is_refused(prepared):
+    with pytest.raises(CaseError, match="CDC6T has 22 values, and needs 32"):
+        prepared(CDC6T.format(""))
+
+
 def test_a_dc_line_is_lost_by_the_name_that_its_file_gives_it(prepared):
     elements = Elements.of(prepared())
     _, named = read_outages("tie 1", elements)
