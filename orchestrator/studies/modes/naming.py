@@ -1,6 +1,7 @@
 """Which modes of a model bear the names that a case gives."""
 
 import fnmatch
+import re
 from collections.abc import Sequence
 from functools import partial
 
@@ -8,6 +9,13 @@ from orchestrator.cases.form.definition import CaseDefinition
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.mode_names import Measure, Naming, name_modes, opposition
 from orchestrator.linear.spectra.modes import Mode
+
+
+def matching(names: Sequence[str], patterns: Sequence[str]) -> list[str]:
+    """Names that fit any of the patterns, such as ``sg*.omega``, in their own order."""
+    # one expression, made once: a question for each of thousands of names and each pattern takes tenths of a second
+    fits = re.compile("|".join(map(fnmatch.translate, patterns))).match
+    return [name for name in names if fits(name)] if patterns else []
 
 
 def named_modes(case: CaseDefinition, model: LinearModel, modes: Sequence[Mode]) -> Naming:
@@ -19,7 +27,7 @@ def modes_named(case: CaseDefinition, names: Sequence[str], modes: Sequence[Mode
     """The same, from the names of the states alone."""
 
     def states(patterns: Sequence[str]) -> list[str]:
-        return [name for name in names if any(fnmatch.fnmatch(name, p) for p in patterns)]
+        return matching(names, patterns)
 
     measures: dict[str, Measure] = {}
     for table in case.table.analysis.modes:
