@@ -37,6 +37,7 @@ from orchestrator.linear.spectra.modes import (
     eigenvalues,
     find_spectrum,
 )
+from orchestrator.linear.spectra.slowest_decay import Decay
 from orchestrator.linear.spectra.stability import WHOLE, Cause, Stability, judge, whole_spectrum
 from orchestrator.systems.coupling.master import Master
 
@@ -262,14 +263,15 @@ def examine(
     system: LinearModel | None,
     *,
     spectrum: Spectrum | None = None,
-    of_system: Spectrum | None = None,
+    of_system: Spectrum | Decay | None = None,
     modes: Sequence[Mode] | None = None,
     shown: Sequence[Mode] | None = None,
     frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
 ) -> Examination:
     """Judge a step map, and look for what would make the verdict wrong; say what it leaves out of the connections.
 
-    ``spectrum`` and ``of_system``: all eigenvalues of both models, where they are known already.
+    ``spectrum`` and ``of_system``: all eigenvalues of both models, where they are known already; of the continuous one,
+    that none of its modes grows will do.
     ``modes``: oscillations that must not depend on the perturbation; by default those of the range. If a component is
     doubtful, all oscillations from 0.1 to 2 Hz are added.
     ``shown``: modes that must not depend on the communication step; by default the same."""

@@ -9,7 +9,7 @@ from 0, and changes the less the more alike poles and modes are; the count does 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from typing import Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,6 +21,8 @@ from orchestrator.core.errors import AnalysisError
 from orchestrator.linear.models.hub_elimination import HubFactors
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.separate_blocks import SparseFactors
+
+Points = NDArray[np.complex128]
 
 
 class Factors:
@@ -71,6 +73,10 @@ class ShiftedEquations:
         self._diagonal = np.flatnonzero((whole.indices == column_of) & (column_of < n))
         self._whole, self._n = whole.astype(complex), n
 
+    def log_determinants(self, points: Points) -> Points:
+        """Log det(A − sI) at each point; see `Determinants`."""
+        return np.array([self.at(s).log_determinant for s in points.tolist()])
+
     def at(self, sigma: complex) -> Factors | FactorsByHub:
         found = None if self._hub is None else self._hub.at(complex(sigma))
         return self._sparse_at(sigma) if found is None else FactorsByHub(found)
@@ -104,8 +110,9 @@ _HALVINGS = 40
 """How often the way between two points is halved; a line that is closer to an eigenvalue than that cannot be
 followed."""
 
-_ON_THE_LINE = 2 * GROWING
-"""A known eigenvalue nearer to the imaginary axis than this [1/s] is no pole: a pole on the line cannot be passed."""
+_MULTIPLIED = 16
+"""So many distances [rad/s] are multiplied before a logarithm is taken: at most 1e9 and at least 1e-9 each, they stay
+far inside of what a number holds."""
 
 _BESIDE = 0.1
 """At the height of a pole nearer to the line than this part of it there is a point: a mode across the line from a pole
@@ -121,53 +128,85 @@ _FARTHEST = 1e7  # end of the imaginary axis [rad/s]: beyond it no part of a sys
 _FIRST = 160  # points to begin with, from 1e-3 rad/s to the end
 
 
+class Determinants(Protocol):
+    """Gives log det(A − sI) at points s, but for a constant; imaginary parts lack whole turns."""
+
+    def log_determinants(self, points: Points) -> Points: ...
+
+
 def count_growing(
-    equations: ShiftedEquations,
+    equations: Determinants,
     alone: Sequence[complex] | Vector,
     known: Sequence[complex] | Vector = (),
+    *,
+    line: float = GROWING,
+    clear: float = GROWING,
 ) -> int:
-    """Number of eigenvalues to the right of `GROWING`, at any frequency; a pair counts twice.
+    """Number of eigenvalues to the right of a line, at any frequency; a pair counts twice.
 
     ``alone``: all eigenvalues of its components, each alone with its inputs held [rad/s]. Far from 0, the system's
     determinant is theirs.
     ``known``: eigenvalues with Im λ > 0 that the system is thought to have [rad/s]. They spare points, and right or
-    wrong they leave the count as it is."""
-    poles = _with_known(np.asarray(alone, dtype=complex), np.asarray(known, dtype=complex))
+    wrong they leave the count as it is.
+    ``line``: the real part of all its points [1/s].
+    ``clear``: a known eigenvalue nearer to the line than this [1/s] is no pole, as a pole on it cannot be passed."""
+    alone, known = np.asarray(alone, dtype=complex), np.asarray(known, dtype=complex)
+    poles = _with_known(alone, known[np.abs(known.real - line) > clear])
 
-    def logarithm(s: complex) -> complex:
-        return equations.at(s).log_determinant - complex(np.log(s - poles).sum())
+    def logarithms(points: Points) -> Points:
+        return equations.log_determinants(points) - sum_of_logarithms(points, poles)
 
-    axis = (GROWING + 1j * _heights(poles)).tolist()
-    values = [logarithm(s) for s in axis]
+    axis: Points = np.asarray(line + 1j * _heights(poles, line), dtype=complex)
+    values = logarithms(axis)
+    starts, ends = (axis[:-1], values[:-1]), (axis[1:], values[1:])
     turn = 0.0
-    for (s_0, f_0), (s_1, f_1) in pairwise(zip(axis, values, strict=True)):
-        waiting = [(s_0, f_0, s_1, f_1, 0)]
-        while waiting:
-            a, f_a, b, f_b, depth = waiting.pop()
-            middle = (a + b) / 2
-            f = logarithm(middle)
-            first, second = _wrapped(f - f_a), _wrapped(f_b - f)
-            if max(abs(first), abs(second), abs(second - first)) <= _STEP:
-                turn += (first + second).imag
-            elif depth == _HALVINGS:
-                raise AnalysisError(
-                    f"an eigenvalue lies at {a:.6g} rad/s, on the line where growth begins"
-                )
-            else:
-                waiting += [(middle, f, b, f_b, depth + 1), (a, f_a, middle, f, depth + 1)]
-    return int((poles.real > GROWING).sum()) - round(turn / np.pi)
+    for _ in range(_HALVINGS + 1):
+        middle = (starts[0] + ends[0]) / 2
+        f = logarithms(middle)
+        first, second = _wrapped(f - starts[1]), _wrapped(ends[1] - f)
+        largest = np.max(np.abs([first, second, second - first]), axis=0)
+        open_ = ~(largest <= _STEP)
+        turn += float((first + second).imag[~open_].sum())
+        if not open_.any():
+            return int((poles.real > line).sum()) - round(turn / np.pi)
+        halves = (middle[open_], f[open_])
+        starts, ends = (
+            _joined((starts[0][open_], starts[1][open_]), halves),
+            _joined(halves, (ends[0][open_], ends[1][open_])),
+        )
+    raise AnalysisError(
+        f"an eigenvalue lies at {starts[0][0]:.6g} rad/s, on the line where growth begins"
+    )
 
 
-def _heights(poles: NDArray[np.complex128]) -> NDArray[np.float64]:
+def _joined(one: tuple[Points, Points], other: tuple[Points, Points]) -> tuple[Points, Points]:
+    """Points with their values, and others behind them."""
+    return np.concatenate([one[0], other[0]]), np.concatenate([one[1], other[1]])
+
+
+def sum_of_logarithms(points: Points, poles: Points) -> Points:
+    """Σ ln(s − p) at each point s, but for whole turns."""
+    found = np.zeros(len(points), dtype=complex)
+    for some in in_parts(poles):
+        found += np.log((points - some[:, None]).prod(axis=0))
+    return found
+
+
+def in_parts(values: NDArray[Any]) -> list[NDArray[Any]]:
+    """The values in parts of as many as may be multiplied before a logarithm is taken."""
+    return np.split(values, range(_MULTIPLIED, len(values), _MULTIPLIED))
+
+
+def _heights(poles: Points, line: float) -> NDArray[np.float64]:
     """Heights of the first points on the line [rad/s], rising from 0."""
-    beside = poles[np.abs(poles.real - GROWING) < _BESIDE * poles.imag].imag
+    beside = poles[np.abs(poles.real - line) < _BESIDE * poles.imag].imag
     crowd = np.sort(poles[np.abs(poles.real) < poles.imag].imag)[::_OF_A_CROWD]
     among = np.sort(np.concatenate([np.geomspace(1e-3, _FARTHEST, _FIRST), beside, crowd]))
     apart = np.diff(among, prepend=0.0) > _SAME_HEIGHT * among
     return np.concatenate([[0.0], among[apart & (among <= _FARTHEST)]])
 
 
-def _with_known(alone: Vector, known: Vector) -> NDArray[np.complex128]:
+def _with_known(alone: Points, known: Points) -> Points:
     """Replace pairs among ``alone`` by the known ones nearest to them, both of a pair; the number of values stays."""
     upper = alone[alone.imag > 0]
     lower, real = alone[alone.imag < 0], alone[alone.imag == 0]
@@ -175,7 +214,7 @@ def _with_known(alone: Vector, known: Vector) -> NDArray[np.complex128]:
         return alone
     pairs = upper.copy()
     free = np.ones(len(pairs), dtype=bool)
-    for value in known[(known.imag > 0) & (np.abs(known.real) > _ON_THE_LINE)]:
+    for value in known[known.imag > 0]:
         if not free.any():
             break
         place = int(np.argmin(np.where(free, np.abs(upper - value), np.inf)))
@@ -183,6 +222,7 @@ def _with_known(alone: Vector, known: Vector) -> NDArray[np.complex128]:
     return np.concatenate([real, pairs, pairs.conj()]).astype(complex)
 
 
-def _wrapped(change: complex) -> complex:
-    """The same logarithm with an angle from −π to π [rad]."""
-    return complex(change.real, (change.imag + np.pi) % (2 * np.pi) - np.pi)
+def _wrapped(change: Points) -> Points:
+    """The same logarithms with angles from −π to π [rad]."""
+    wrapped: Points = change.real + 1j * ((change.imag + np.pi) % (2 * np.pi) - np.pi)
+    return wrapped

@@ -29,6 +29,7 @@ from orchestrator.linear.spectra.modes import (
     make_mode,
     oscillations,
 )
+from orchestrator.linear.spectra.slowest_decay import Decay
 
 # up to so many states, all eigenvalues are computed; in larger systems growing ones are searched
 # for
@@ -285,19 +286,23 @@ def judge(
     model: LinearModel,
     spectrum: Spectrum | None = None,
     system: LinearModel | None = None,
-    of_system: Spectrum | None = None,
+    of_system: Spectrum | Decay | None = None,
 ) -> Stability:
     """The verdict on a step map, or on a continuous model.
 
     ``spectrum``: all eigenvalues of the model where they are known already.
     ``system``: the continuous model of the same system; None where a component gives no derivatives.
-    ``of_system``: all eigenvalues of ``system`` where they are known already."""
+    ``of_system``: all eigenvalues of ``system`` where they are known already, or that none of its modes grows."""
     spectrum = spectrum or whole_spectrum(model)
     own = _look_at(model, spectrum)
     if model.step_size is None:
         return own
     if system is None:
         return replace(own, cause=Cause.UNKNOWN) if own.stable is False else own
+    if isinstance(of_system, Decay):
+        if own.stable:
+            return replace(own, continuous_growth_rate=of_system.rate)
+        of_system = None  # what grows is told beside the mode of the system, which is to be found
     continuous = _look_at(system, of_system or whole_spectrum(system))
     rate = continuous.largest_growth_rate
     if own.stable is False and continuous.stable is not None and _only_slow(spectrum, own):

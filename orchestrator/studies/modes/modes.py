@@ -4,7 +4,7 @@ import fnmatch
 import math
 from cmath import phase
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -36,11 +36,19 @@ from orchestrator.linear.models.steady_state import OperatingPoint, find_operati
 from orchestrator.linear.spectra import modes as spectra
 from orchestrator.linear.spectra.critical_modes import find_critical_modes
 from orchestrator.linear.spectra.mode_names import Naming
-from orchestrator.linear.spectra.stability import Hidden, Stability, hidden, whole_spectrum
+from orchestrator.linear.spectra.slowest_decay import LEAST_STATES, Decay, reduced, slowest_decay
+from orchestrator.linear.spectra.stability import (
+    WHOLE,
+    Hidden,
+    Stability,
+    grows,
+    hidden,
+    whole_spectrum,
+)
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.simulation.engine import Engine
 from orchestrator.studies.modes.mode_identity import NamedSystem, settle_names
-from orchestrator.studies.modes.naming import named_modes
+from orchestrator.studies.modes.naming import matching, named_modes
 from orchestrator.studies.modes.start_errors import start_error
 from orchestrator.systems.coupling.coupled import open_plan
 from orchestrator.systems.coupling.master import Master
@@ -271,9 +279,16 @@ class Linearised:
         self._black_boxes = black_boxes
         self._model, self._system = model_of(master, blocks), continuous_model(master, blocks)
         self.named: NamedSystem | None = None
+        self._of_system: Future[spectra.Spectrum | Decay | None]
 
     def begin(self, pool: Executor) -> None:
-        if self._system is not None and len(self._model.names) <= spectra.ALL_VECTORS:
+        if self._system is not None and LEAST_STATES <= len(self._system.names) <= WHOLE:
+            self._network = pool.submit(reduced, self._system)
+            self._found = pool.submit(self._spectrum_of_map)
+            # no thread waits for the map's meanwhile: the one that has it goes on
+            self._of_system = Future()
+            self._found.add_done_callback(self._go_on)
+        elif self._system is not None and len(self._model.names) <= spectra.ALL_VECTORS:
             # SciPy's `eig` lets no other thread of Python run in a small system, so that the other spectrum must be on
             # its way, in NumPy's `eigvals`, before that begins.
             _ = self._system.A
@@ -282,6 +297,22 @@ class Linearised:
         else:  # the step map's takes longer
             self._found = pool.submit(self._spectrum_of_map)
             self._of_system = pool.submit(self._spectrum_of_system)
+
+    def _go_on(self, found: "Future[tuple[spectra.Spectrum | None, list[spectra.Mode]]]") -> None:
+        try:
+            of_map, _ = found.result()
+            self._of_system.set_result(self._decay_of_system(of_map) or self._spectrum_of_system())
+        except BaseException as error:  # for the thread that asks for the result
+            self._of_system.set_exception(error)
+
+    def _decay_of_system(self, of_map: spectra.Spectrum | None) -> Decay | None:
+        """That no mode of the system grows, proved without all its eigenvalues; None where they are needed."""
+        network = self._network.result()
+        if self._system is None or network is None or of_map is None:
+            return None
+        if grows(of_map.eigenvalues).any():
+            return None
+        return slowest_decay(self._system, network, of_map.eigenvalues)
 
     def _spectrum_of_system(self) -> spectra.Spectrum | None:
         return None if self._system is None else whole_spectrum(self._system)
@@ -374,11 +405,7 @@ class Linearised:
                 *naming.doubts,
                 *(f"{fault}: the modes are those before it" for fault in failing),
             ),
-            swing=tuple(
-                name
-                for name in model.names
-                if any(fnmatch.fnmatchcase(name, p) for p in analysis.swing)
-            ),
+            swing=tuple(matching(model.names, analysis.swing)),
             areas=areas_of(analysis.areas, prepared.system) or prepared.areas_of_units,
             stability=examined.stability.doubted(
                 [
