@@ -99,6 +99,19 @@ def test_a_network_that_does_not_fall_into_halves_is_not_divided():
     assert isinstance(system().hub.near_at(SIGMA).port, DenseHub)
 
 
+def test_solutions_that_are_not_close_are_corrected_and_the_hub_stays_divided(monkeypatch):
+    monkeypatch.setattr(hub_elimination, "_NEAR", 0.0)
+    model = along_a_line()
+    factors = model.hub.near_at(SIGMA)
+    assert not isinstance(factors.port, DenseHub)
+    shifted, b = model.A - SIGMA * np.eye(STATES), np.ones((STATES, 2), dtype=complex)
+    for solve, matrix in (
+        (factors.solve, shifted),
+        (factors.solve_adjoint, shifted.conj().T),
+    ):
+        assert np.abs(matrix @ solve(b) - b).max() < 1e-10
+
+
 def test_ties_of_weight_that_are_left_out_are_noticed(monkeypatch):
     monkeypatch.setattr(divided_hub, "_NEGLIGIBLE", 3e-2)
     model = along_a_line()
