@@ -248,22 +248,60 @@ def _best_of_curves(
 
 
 def _slopes_inside(
-    residuals: Residuals, told: Sequence[Adjustable], values: Mapping[str, float | bool]
+    residuals: Residuals,
+    told: Sequence[Adjustable],
+    values: Mapping[str, float | bool],
+    *,
+    both_sides: bool = True,
 ) -> Matrix:
     """How the errors move with each parameter; next to a bound at a point so far within it that both sides are."""
     at = [replace(one, start=float(values[one.name])) for one in told]
     within = [replace(one, start=one.inside()) for one in at]
     there = {**values, **{one.name: one.start for one in within}}
-    return residuals.slopes(there, {one.name: one.step for one in within})
+    steps = {one.name: one.step for one in within}
+    return residuals.slopes(there, steps, both_sides=both_sides)
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """A part of a fit: means of the errors over a time [s], and the relative gain at which it ends."""
+
+    residuals: Residuals
+    mean: float
+    tolerance: float
+    best: _Best
+    both_sides: bool  # of a parameter, by which its slope is found
 
 
 def _least_squares(
     residuals: Residuals, told: Sequence[Adjustable], switches: Mapping[str, bool], best: _Best
 ) -> None:
-    """From one start: by means over some time first, whose minimum is wide, then by the samples."""
+    """From one start: by means over some time first, whose minimum is wide, then by the samples.
+
+    The first part may be in longer steps: it says where the second one begins, and is the answer where it is all."""
+    first = _Stage(residuals.rough, _COARSE, _COARSE_TOLERANCE, _Best(), both_sides=False)
+    second = _Stage(residuals, 0.0, _TOLERANCE, best, both_sides=True)
     hidden = residuals.hidden
+    at = np.array(
+        [*(one.inside() / one.reach for one in told), *[0.0] * len(hidden)], dtype=np.float64
+    )
+    try:
+        at = _stage_end(first, told, switches, at)
+    except KeyboardInterrupt:
+        if not best.values:
+            best.values = first.best.values
+        raise
+    _stage_end(second, told, switches, at)
+
+
+def _stage_end(
+    stage: _Stage, told: Sequence[Adjustable], switches: Mapping[str, bool], at: Numbers
+) -> Numbers:
+    """Where a part of a fit ends, in units of the reach, as it begins."""
+    residuals, best, hidden = stage.residuals, stage.best, stage.residuals.hidden
     names = [*(one.name for one in told), *(one.name for one in hidden)]
     reach = np.array([*(one.reach for one in told), *(one.scale for one in hidden)])
+    mean = partial(means_over, residuals.stretches, stage.mean)
 
     def values(x: Numbers) -> dict[str, float | bool]:
         own = {name: float(v) for name, v in zip(names, x * reach, strict=True)}
@@ -277,29 +315,28 @@ def _least_squares(
             best.cost, best.rms, best.values = cost, _rms(found), given
             said = ", ".join(f"{one.name} = {given[one.name]:.4g}" for one in told)
             residuals.report(f"fit: rms {_rms(found):.4g} scatters with {said}")
-        return found
+        return mean(found)
 
     def slopes(x: Numbers) -> Matrix:
         given = values(x)
-        own = _slopes_inside(residuals, told, given)
-        return np.asarray(np.column_stack([own, residuals.hidden_slopes(given)]) * reach)
+        own = _slopes_inside(residuals, told, given, both_sides=stage.both_sides)
+        return mean(np.asarray(np.column_stack([own, residuals.hidden_slopes(given)]) * reach))
 
     free = len(hidden)
     low = np.array([*(one.low for one in told), *[-np.inf] * free]) / reach
     high = np.array([*(one.high for one in told), *[np.inf] * free]) / reach
-    at = np.array([*(one.inside() for one in told), *[0.0] * free]) / reach
-    for length, tolerance in ((_COARSE, _COARSE_TOLERANCE), (0.0, _TOLERANCE)):
-        mean = partial(means_over, residuals.stretches, length)
-        at = optimize.least_squares(
-            lambda x, mean=mean: mean(errors(x)),
+    return np.asarray(
+        optimize.least_squares(
+            errors,
             at,
-            jac=lambda x, mean=mean: mean(slopes(x)),
+            jac=slopes,
             bounds=(low, high),
-            xtol=tolerance,
-            ftol=max(tolerance, _untold_part(residuals, values(at))),
+            xtol=stage.tolerance,
+            ftol=max(stage.tolerance, _untold_part(residuals, values(at))),
             gtol=None,
             max_nfev=_MOST_RUNS,
         ).x
+    )
 
 
 def _untold_part(residuals: Residuals, values: Mapping[str, float | bool]) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -46,18 +47,28 @@ class ErrorRows:
 class Residuals:
     """Errors of one device at some events; a run is made for each event and each set of values.
 
-    ``hidden``: parts of the voltage that no sample holds, unknowns whose likelihoods are the last rows; ``runs``: how
-    many were made."""
+    ``hidden``: parts of the voltage that no sample holds, unknowns whose likelihoods are the last rows."""
 
     device: PlayedDevice
     stretches: Sequence[ErrorRows]
     report: Report = lambda text: None
-    runs: int = 0
+    _made: int = 0
     hidden: Sequence[HiddenVoltage] = field(init=False)
     _kept: dict[tuple[tuple[str, float | bool], ...], Numbers] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.hidden = hidden_voltages([one.event for one in self.stretches])
+
+    @property
+    def runs(self) -> int:
+        """How many runs were made, those in longer steps among them."""
+        return self._made + (0 if self.rough is self else self.rough.runs)
+
+    @cached_property
+    def rough(self) -> Residuals:
+        """The same in longer steps, where the device takes any: good enough to see where a fit goes."""
+        device = self.device.rough
+        return self if device is self.device else Residuals(device, self.stretches, self.report)
 
     def at(self, values: Values) -> Numbers:
         """Errors with other values, in scatters; those of values with which the device does not run are large."""
@@ -82,24 +93,27 @@ class Residuals:
             device.trials.note("values on the way of the fit", error)
             return np.full(stretch.size, _REFUSED)
         finally:
-            self.runs += 1
+            self._made += 1
         return weighted(power - event.recording.power, stretch)
 
     def hidden_later(self, values: Values) -> Numbers:
         """By how much the errors change if all hidden parts of the voltage are one sample later."""
         other = Residuals(self.device, self.stretches, self.report)
         other.hidden = [replace(one, sample=one.sample + 1) for one in self.hidden]
-        self.runs += len(self.stretches)
+        self._made += len(self.stretches)
         return other.at(values) - self.at(values)
 
-    def slopes(self, values: Values, steps: Mapping[str, float]) -> Matrix:
-        """How the errors move with each parameter, a column each, by differences to both sides."""
+    def slopes(
+        self, values: Values, steps: Mapping[str, float], *, both_sides: bool = True
+    ) -> Matrix:
+        """How the errors move with each parameter, a column each, by differences to one side or to both."""
         columns = []
         for name, step in steps.items():
             self.report(f"sensitivity to {name}")
             at = float(values[name])
-            high, low = (self.at({**values, name: at + side * step}) for side in (1, -1))
-            columns.append((high - low) / (2 * step))
+            high = self.at({**values, name: at + step})
+            low = self.at({**values, name: at - step} if both_sides else values)
+            columns.append((high - low) / (step + both_sides * step))
         return np.column_stack(columns)
 
     def hidden_slopes(self, values: Values) -> Matrix:

@@ -49,6 +49,13 @@ def with_noise(clean, seed=1, **scale):
     return noisy
 
 
+def of_pmu(frame, every=20, mean=40):
+    """Means over two periods around each sample, as a PMU gives them."""
+    angle = np.unwrap(np.deg2rad(frame.angle_deg))
+    smooth = frame.assign(angle_deg=np.rad2deg(angle)).rolling(mean, center=True, min_periods=1)
+    return smooth.mean().assign(time=frame.time).iloc[::every]
+
+
 def written(frame, folder, name="rec.csv"):
     path = folder / name
     frame.to_csv(path, index=False, float_format="%.9g")

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 import orchestrator as gfor_in_python
 from orchestrator.studies.validation.clipped import clipped_run
 from orchestrator.studies.validation.limits import EXAMPLE
-from tests.studies.validation.recordings import run, table, waves, with_noise
+from tests.studies.validation.recordings import of_pmu, run, table, waves, with_noise
 
 ON = {"pod_p.enabled": True}
 
@@ -97,13 +97,6 @@ def in_waves(frame):
     units = {"v": "kv", "i": "ka"}
     named = {f"{name}_{units[name[0]]}": values for name, values in waves(frame).items()}
     return frame[["time"]].assign(**named)
-
-
-def of_pmu(frame, every=20, mean=40):
-    """Means over two periods around each sample, as a PMU gives them."""
-    angle = np.unwrap(np.deg2rad(frame.angle_deg))
-    smooth = frame.assign(angle_deg=np.rad2deg(angle)).rolling(mean, center=True, min_periods=1)
-    return smooth.mean().assign(time=frame.time).iloc[::every]
 
 
 PLANTED = {
