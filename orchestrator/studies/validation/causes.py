@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
@@ -14,7 +13,9 @@ from orchestrator.core.arrays import Complex, Numbers
 
 _TIMES_SCATTER = 3.0  # times the recordings' scatter, above which what a cause leaves is no scatter
 _LEAST_LEFT = 0.001  # what samples and steps make of a right model [pu of the rating]
-_ALIKE = 1e-6  # part of a value by which two ways to it may differ
+_HARDLY_APART = (
+    1.3  # times the error that the best cause leaves, up to which another one is hardly told apart
+)
 _EXPLAINS = 0.75  # part of the squared error beyond the scatter that an explanation takes away
 _MOST_DELAY = 0.25  # longest delay that is looked for [s]
 _DELAYS = 100  # that are tried at first
@@ -54,6 +55,7 @@ class Explanation:
     left: float
     noise: float = 0.0
     beside: Mapping[str, float] = field(default_factory=dict)  # another number with its value
+    outdone: bool = False  # whether another cause leaves clearly less
 
     @property
     def share(self) -> float:
@@ -64,18 +66,24 @@ class Explanation:
 
     @property
     def explains(self) -> bool:
-        """Return whether most of the error goes away with it."""
-        return self.share >= _EXPLAINS
+        """Return whether most of the error goes away with it, and no other cause leaves clearly less."""
+        return self.share >= _EXPLAINS and not self.outdone
 
     @property
     def leaves_much(self) -> bool:
         """Return whether what is left stands far above the scatter: something else is off as well."""
-        return self.left > max(_TIMES_SCATTER * self.noise, _LEAST_LEFT)
+        return leaves_much(self.left, self.noise)
 
     def same_as(self, other: Explanation) -> bool:
-        """Return whether another cause, found on another way, is this one."""
-        mine, its = ((x.cause, x.name, dict(x.beside)) for x in (self, other))
-        return mine == its and math.isclose(self.value, other.value, rel_tol=_ALIKE)
+        """Return whether another cause, found on another way, is of the same parameters.
+
+        Positions of one kind are different causes, values of one number are not."""
+        mine, its = ((x.cause, x.name, *x.beside) for x in (self, other))
+        return mine == its and (self.cause is not CauseKind.POSITION or self.value == other.value)
+
+    def is_beside(self, best: Explanation) -> bool:
+        """Return whether the recordings hardly tell it apart from the cause that leaves the least."""
+        return self.left < max(_HARDLY_APART * best.left, best.noise)
 
     def as_json(self) -> dict[str, Any]:
         return {
@@ -107,6 +115,23 @@ class CauseSearch:
     def explains(self) -> bool:
         """Return whether the first of them takes most of the error away."""
         return bool(self.causes) and self.causes[0].explains
+
+
+def leaves_much(left: float, noise: float) -> bool:
+    """Return whether an error stands far above what the recordings scatter [pu of the rating]."""
+    return left > max(_TIMES_SCATTER * noise, _LEAST_LEFT)
+
+
+def without_worse_ways(causes: Sequence[Explanation]) -> list[Explanation]:
+    """Each cause once, of those that leave the least first; one that leaves clearly more than the first is outdone.
+
+    Where the first leaves the recordings' scatter, what leaves more is off; where it does not, as well: the data
+    speak for the first."""
+    found: list[Explanation] = []
+    for one in causes:
+        if not any(one.same_as(other) for other in found):
+            found.append(replace(one, outdone=bool(found) and not one.is_beside(found[0])))
+    return found
 
 
 def later(

@@ -19,9 +19,6 @@ from orchestrator.studies.validation.trials import RefusedTrial
 Figures = Mapping[str, Any]
 
 _COUPLED_STEP = 100.0  # communication step of a coupled run [us]
-_ALIKE = (
-    1.3  # times the error that the best cause leaves, up to which another one is hardly told apart
-)
 
 
 def sentence(question: Question) -> str:
@@ -554,11 +551,7 @@ def _said_of_causes(explanations: Sequence[Explanation]) -> str:
         )
     said = f"The likeliest cause is {_cause(best)}: "
     said += f"it explains {best.share:.0%} of the squared error beyond the scatter."
-    alike = [
-        one
-        for one in explanations[1:]
-        if one.name != best.name and one.explains and one.left < _ALIKE * best.left
-    ]
+    alike = [one for one in explanations[1:] if one.name != best.name and one.explains]
     if best.leaves_much:
         times = f", {best.left / best.noise:.0f} times the scatter" if best.noise > 0 else ""
         said += (

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import orchestrator as gfor_in_python
-from orchestrator.studies.validation.causes import CauseKind, Explanation
+from orchestrator.studies.validation.cause_numbers import Promise, numbers_by_factors
+from orchestrator.studies.validation.causes import CauseKind, Explanation, without_worse_ways
 from orchestrator.studies.validation.hidden import HiddenPart
+from orchestrator.studies.validation.parameters import Adjustable
 from orchestrator.studies.validation.words import explanation_sentence
 from tests.studies.validation.recordings import run, table, with_noise
 
@@ -34,6 +36,79 @@ def test_a_wrong_inertia_is_named_with_the_plants():
     assert best.value == pytest.approx(5.2, rel=0.01)
     assert best.explains
     assert not second.explains
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_an_inertia_that_is_off_by_a_factor_is_named(factor):
+    """It swings out of phase all the way, so that no slope leads there."""
+    step = {"time": 0.5, "component": "grid", "type": "load_change", "load": "load_7", "scale": 1.1}
+    case = gfor_in_python.load("k2a").with_(
+        events=[step], solver={"record": ["*"], "record_interval": "5 ms"}
+    )
+    ran = case.scenario("no_pss", {"sg1.machine.H": 6.5 * factor}).run(stop=3.0).dataset
+    frame = with_noise(table(ran, unit="sg1", bus="grid.bus_1"))
+    given = {"component": "sg1", "scenario": "no_pss", "step": "1 ms"}
+    best, *others = explained(frame, "k2a", **given)
+    assert (best.name, best.value) == ("machine.H", pytest.approx(6.5 * factor, rel=0.01))
+    assert best.explains
+    assert not any(one.explains for one in others)
+
+
+@pytest.mark.parametrize(("name", "plants"), [("pod_p.K", 50.0), ("droop.tau_P", 0.4)])
+def test_a_number_that_is_off_by_four_is_named_alone(name, plants):
+    value = {"gfor__" + name.replace(".", "__"): plants}
+    best, *others = explained(with_noise(table(run("pod_p", stop=4.0, **value))), values=ON)
+    assert (best.name, best.value) == (name, pytest.approx(plants, rel=0.01))
+    assert not best.leaves_much
+    assert not any(one.explains for one in others)
+
+
+class TwoValleys:
+    """A bench whose error has a valley at the model's value and a deeper one at four times it."""
+
+    def __init__(self):
+        self.asked = []
+        self.idle = []
+        self.error = np.array([0.5, 1.0])
+
+    def report(self, text):
+        pass
+
+    def responses(self, values):
+        self.asked.append(values["x"])
+        return values["x"]
+
+    def errors(self, x):
+        near, far = abs(x - 1.0), abs(np.log(x / 4.0))
+        return self.error + near if near < 0.3 else np.array([0.3, 0.5]) * far
+
+    def explanation(self, cause, name, now, value, left, *, unit):
+        return Explanation(cause, name, unit, now, value, 1.0, float(np.sqrt(left @ left)))
+
+
+def test_doublings_lead_where_no_slope_does():
+    bench = TwoValleys()
+    number = Adjustable("x", "s", start=1.0, low=0.1, high=100.0)
+    promise = Promise(number, [], np.array([1.0, 1.0]))
+    (found,) = numbers_by_factors(bench, bench, [promise])
+    assert found.value == pytest.approx(4.0, rel=0.01)
+    assert bench.asked[:4] == [0.5, 2.0, 4.0, 8.0]
+    low = replace(number, high=1.9, low=0.6)
+    assert list(numbers_by_factors(bench, bench, [replace(promise, number=low)])) == []
+
+
+def test_a_cause_that_leaves_clearly_more_than_the_first_explains_nothing():
+    """0.0012 of 0.005 is 79 % of the squared error, and nothing beside a cause that leaves the scatter."""
+    right = Explanation(CauseKind.VALUE, "droop.tau_P", "s", 0.1, 0.25, 0.005, 0.0004, noise=0.0003)
+    wrong = replace(right, name="pod_p.T_S1", left=0.0022)
+    assert wrong.explains
+    alike = replace(right, name="droop.R_f", left=0.0005)
+    first, second, third = without_worse_ways([right, alike, wrong])
+    assert (first.explains, second.explains, third.explains) == (True, True, False)
+    said = explanation_sentence([first, second, third])
+    assert "hardly apart from droop.R_f" in said
+    assert "T_S1" not in said
+    assert without_worse_ways([right, replace(right, value=0.2, left=0.001)]) == [right]
 
 
 def test_a_wrong_droop_is_named_though_what_the_samples_do_not_hold_makes_most_of_the_error():
@@ -124,4 +199,5 @@ def test_a_cause_beside_another_is_not_said_to_be_all():
     assert "something else may be off" not in explanation_sentence([alone])
     assert "0.0019 pu (rms) are left, 3 times the scatter" in explanation_sentence([beside])
     assert alone.same_as(replace(alone, left=0.001))
-    assert not alone.same_as(beside)
+    assert alone.same_as(beside)
+    assert not alone.same_as(replace(alone, name="pod_p.T_W"))

@@ -1,0 +1,161 @@
+"""Numbers of a device as causes of its errors: followed along their slopes, and tried at doublings and halvings.
+
+A straight line around the model's value does not lead to one that is off by a factor: half an inertia swings out of
+phase all the way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from orchestrator.core.arrays import Numbers
+from orchestrator.devices.fmi.description import VariableInfo
+from orchestrator.studies.validation.cause_bench import CauseBench, Responses, squares_of
+from orchestrator.studies.validation.causes import CauseKind, Explanation
+from orchestrator.studies.validation.parameters import Adjustable, adjustable
+
+_STEP = 0.02  # difference for a sensitivity, as part of a parameter's reach
+_FOLLOWED = 5  # numbers that are followed to their best value, those that promise the most
+_MOST_STEPS = 5  # runs in which one is followed
+_SETTLED = 1e-3  # part of the squared error: a smaller gain ends the following
+_FACTORS = (0.5, 2.0)  # by which a number is tried at first, and as long as it leaves less
+_MOST_FACTORS = 4  # of one number in one direction: a sixteenth, and sixteen times
+_FOLLOWED_FAR = 3  # numbers that are followed from the best of these
+
+
+@dataclass(frozen=True)
+class Promise:
+    """A number, and what a small change of it does to the responses and to the errors, both by its unit."""
+
+    number: Adjustable
+    moves: Responses
+    slope: Numbers
+
+    def gain(self, error: Numbers) -> float:
+        """The part that a straight line promises to take of the squared error [pu²]."""
+        return float(self.slope @ error) ** 2 / float(self.slope @ self.slope)
+
+
+def numbers_by_slope(
+    bench: CauseBench, rough: CauseBench, promises: Sequence[Promise]
+) -> Iterator[Explanation]:
+    """The numbers that promise the most, each followed by itself to where it leaves the least."""
+    ordered = sorted(promises, key=lambda one: -one.gain(rough.error))
+    for one in ordered[:_FOLLOWED]:
+        bench.report(f"following {one.number.name}")
+        yield _confirmed(bench, rough, one.number, follow(rough, one))
+
+
+def promises_of(
+    bench: CauseBench, parameters: Iterable[VariableInfo], others: Sequence[str] = ()
+) -> Iterator[Promise]:
+    """The numbers among some parameters that move the response at all; ``others``: as in `follow`."""
+    for info in parameters:
+        one = adjustable(bench.device, info, None)
+        if one.high <= one.low:
+            continue
+        step = _STEP * one.reach
+        step = step if one.start + step <= one.high else -step
+        bench.report(f"sensitivity to {one.name}")
+        found = bench.responses(dict.fromkeys((one.name, *others), one.start + step))
+        if found is None:
+            continue
+        slope = (bench.errors(found) - bench.error) / step
+        if float(slope @ slope) * one.reach**2 > _SETTLED**2 * float(bench.error @ bench.error):
+            pairs = zip(found, bench.base, strict=True)
+            yield Promise(one, [(moved - base) / step for moved, base in pairs], slope)
+        else:
+            bench.idle.append(info)
+
+
+def follow(
+    bench: CauseBench, promise: Promise, others: Sequence[str] = ()
+) -> tuple[float, Numbers]:
+    """The best value of one number, from its start on.
+
+    ``others``: numbers that have the same value all along."""
+    begin = _Place(promise.number.start, bench.error, promise.slope)
+    return _best_from(bench, promise.number, begin, others)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A value of a number, with its error and how that moves with the number there."""
+
+    value: float
+    error: Numbers
+    slope: Numbers
+
+
+def _best_from(
+    bench: CauseBench, number: Adjustable, begin: _Place, others: Sequence[str] = ()
+) -> tuple[float, Numbers]:
+    """The best value of a number, by Gauss and Newton with secants for slopes."""
+    at, error, slope = begin.value, begin.error, begin.slope
+    size = squares_of(slope)
+    way = -float(slope @ error) / size if size > 0 else 0.0
+    for _ in range(_MOST_STEPS):
+        value = min(max(at + way, number.low), number.high)
+        moved = dict.fromkeys((number.name, *others), value)
+        found = bench.responses(moved) if value != at else None
+        here = None if found is None else bench.errors(found)
+        gained = -1.0 if here is None else float(error @ error - here @ here)
+        if here is None or gained < 0:
+            way *= 0.4
+            continue
+        slope = (here - error) / (value - at)
+        done = gained < _SETTLED * float(error @ error)
+        at, error = value, here
+        size = squares_of(slope)
+        if done or size == 0:
+            break
+        way = -float(slope @ error) / size
+    return at, error
+
+
+def numbers_by_factors(
+    bench: CauseBench, rough: CauseBench, promises: Sequence[Promise]
+) -> Iterator[Explanation]:
+    """Positive numbers at doublings and halvings; those that leave the least are followed from there.
+
+    One that moves nothing where it is may be a limit that is not reached: it is tried lower."""
+    moving = [(one.number, _FACTORS) for one in promises]
+    idle = [(adjustable(bench.device, info, None), _FACTORS[:1]) for info in rough.idle]
+    found: list[tuple[float, Adjustable, _Place]] = []
+    for number, factors in [*moving, *idle]:
+        places = [place for factor in factors for place in _along_factors(rough, number, factor)]
+        if places:
+            best = min(places, key=lambda one: squares_of(one.error))
+            found.append((squares_of(best.error), number, best))
+    for _, number, place in sorted(found, key=lambda one: one[0])[:_FOLLOWED_FAR]:
+        bench.report(f"following {number.name} from {place.value:.4g}")
+        value, left = _best_from(rough, number, place)
+        yield _confirmed(bench, rough, number, (value, left))
+
+
+def _along_factors(rough: CauseBench, number: Adjustable, factor: float) -> Iterator[_Place]:
+    """A number at a factor, at its square and so on, as long as each leaves less than the one before."""
+    at, error = number.start, rough.error
+    for _ in range(_MOST_FACTORS):
+        value = factor * at
+        if at <= 0 or not number.low <= value <= number.high:
+            return
+        rough.report(f"trying {number.name} = {value:.4g}")
+        found = rough.responses({number.name: value})
+        here = None if found is None else rough.errors(found)
+        if here is None or squares_of(here) >= squares_of(error):
+            return
+        yield _Place(value, here, (here - error) / (value - at))
+        at, error = value, here
+
+
+def _confirmed(
+    bench: CauseBench, rough: CauseBench, number: Adjustable, best: tuple[float, Numbers]
+) -> Explanation:
+    """A number at its best value, with what the device leaves there in its own steps."""
+    value, left = best
+    found = None if rough is bench else bench.responses({number.name: value})
+    left = left if found is None else bench.errors(found)
+    return bench.explanation(
+        CauseKind.VALUE, number.name, number.start, value, left, unit=number.unit
+    )
