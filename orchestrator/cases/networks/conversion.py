@@ -9,6 +9,7 @@ import math
 from collections import Counter
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 from fmus.grid.network import SMALLEST_REACTANCE, Line, Load, Shunt, ThreeWinding
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
@@ -27,6 +28,8 @@ _NO_LIMIT = 1e4
 _RATE_A = 5  # column of MATPOWER's table of branches
 _VMAX = 11  # columns of MATPOWER's table of buses
 _VMIN = 12
+
+_Value = TypeVar("_Value")
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,33 +110,36 @@ def import_network(
         for n, y in ((n, y * source.base_mva) for n, y in to_earth.items())
         if abs(y) > _NEGLIGIBLE
     ]
+    buses = [bus_of(label) for label in labels.values()]
     reference = [n for n, row in rows.items() if int(row[1]) == _REFERENCE]
+    generation = {n: _generation(labels[n], members) for n, members in at_bus.items()}
+    feeding = {n: p for n, p in _fed(source, rows).items() if p < -_NEGLIGIBLE}
+    capacitors = {n: float(row[5]) for n, row in rows.items() if row[5] > _NEGLIGIBLE}
+    titles = {n: one_line(title) for n, title in source.titles.items() if title}
+    unit_names = {n: one_line(name) for n, name in source.unit_names.items()}
     return ImportedNetwork(
-        tuple(bus for label in labels.values() if (bus := bus_of(label)) not in merged),
+        tuple(bus for bus in buses if bus not in merged),
         tuple(lines),
         loads=tuple(loads),
         shunts=tuple(shunts),
-        generation={
-            bus_of(labels[n]): _generation(labels[n], members) for n, members in at_bus.items()
-        },
+        generation=_by_bus(generation, labels),
         slack=bus_of(labels[reference[0]]) if reference else None,
         frequency=source.frequency,
         transformers=tuple(transformers),
         load_parts=_load_parts(source, labels),
-        feeding={bus_of(labels[n]): p for n, p in _fed(source, rows).items() if p < -_NEGLIGIBLE},
-        capacitors={
-            bus_of(labels[n]): float(row[5]) for n, row in rows.items() if row[5] > _NEGLIGIBLE
-        },
+        feeding=_by_bus(feeding, labels),
+        capacitors=_by_bus(capacitors, labels),
         limits=FileLimits(ratings, _bands(rows, labels)),
-        titles={
-            bus_of(labels[n]): one_line(x) for n, x in source.titles.items() if x and n in labels
-        },
+        titles=_by_bus(titles, labels),
         branch_names=names,
-        unit_names={
-            bus_of(labels[n]): one_line(x) for n, x in source.unit_names.items() if n in labels
-        },
-        regions={bus_of(labels[n]): region for n, region in source.regions.items() if n in labels},
+        unit_names=_by_bus(unit_names, labels),
+        regions=_by_bus(source.regions, labels),
     )
+
+
+def _by_bus(by_number: Mapping[int, _Value], labels: Mapping[int, str]) -> dict[str, _Value]:
+    """Values by the names of the buses that are in service, from values by the numbers of all."""
+    return {bus_of(labels[n]): value for n, value in by_number.items() if n in labels}
 
 
 def bus_of(label: str) -> str:

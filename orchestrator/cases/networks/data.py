@@ -1,6 +1,6 @@
 """The network of a case: written out in tables and files, taken from another program's data, or both."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -54,7 +54,7 @@ from orchestrator.cases.networks.psse.studied_parts import (
 from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
 from orchestrator.cases.networks.regions import Regions
 from orchestrator.cases.networks.sequence_data import SequenceData
-from orchestrator.cases.networks.sources import read_matpower, read_pandapower
+from orchestrator.cases.networks.sources import SourceTables, read_matpower, read_pandapower
 from orchestrator.core.arrays import Matrix
 from orchestrator.core.errors import InputError, Problem
 
@@ -84,10 +84,10 @@ class _Source:
 
 @dataclass(frozen=True)
 class NetworkData:
-    buses: tuple[str, ...]
-    lines: tuple[Line, ...]
-    loads: tuple[Load, ...]
-    shunts: tuple[Shunt, ...]
+    buses: tuple[str, ...] = ()
+    lines: tuple[Line, ...] = ()
+    loads: tuple[Load, ...] = ()
+    shunts: tuple[Shunt, ...] = ()
     # power and voltage of the units at each bus
     generation: dict[str, Generation] = field(default_factory=dict)
     slack: str | None = None  # reference bus of the source
@@ -162,14 +162,18 @@ def network_data(
     lines += [line for line, _ in in_file]
     loads += _loads_of_file(table, directory)
     sequences = _sequences(found, table, directory, [*source.lines])
-    buses = dict.fromkeys((*source.buses, *table.buses))
-    if not buses:  # no list of buses to check the lines' ends against: the ends define the buses
-        ends = [bus for line in lines for bus in (line.from_bus, line.to_bus)]
-        buses = dict.fromkeys([*ends, *(bus for x in transformers for bus in x.buses)])
+    buses = dict.fromkeys((*source.buses, *table.buses)) or _ends_of(lines, transformers)
     of_source = [
         with_laws(x, table, parts=source.load_parts.get(x.name, (0j, 0j))) for x in source.loads
     ]
     of_devices = [with_laws(x, table, device_laws(table)) for x in found.device_loads]
+    places = {line.name: place for line, place in in_file}
+    merged = found.raw.same if found.raw else {}
+    device_loads = tuple(load.name for load in found.device_loads)
+    changes, records = [*found.changes], [*found.records]
+    if sequences is not None:
+        changes += sequences.questions
+        records += sequences.records
     return NetworkData(
         tuple(buses),
         (*source.lines, *lines),
@@ -177,35 +181,31 @@ def network_data(
         shunts=(*source.shunts, *shunts),
         generation=source.generation,
         slack=source.slack,
-        frequency=table.frequency if table.frequency is not None else source.frequency,
+        frequency=source.frequency if table.frequency is None else table.frequency,
         stray_B=table.stray_B,
-        places={line.name: place for line, place in in_file},
+        places=places,
         transformers=(*source.transformers, *transformers),
-        changes=(*found.changes, *(sequences.questions if sequences else ())),
+        changes=tuple(changes),
         machines=found.machines,
         idle_machines=found.idle,
         feeding=source.feeding,
         capacitors=source.capacitors,
         misfit=found.misfit,
         file_voltages=found.file_voltages,
-        flow_laws={
-            load.name: flow_laws(load, source.load_parts[load.name])
-            for load in source.loads
-            if load.name in source.load_parts
-        },
-        limits=source.limits if table.raw or table.matpower else FileLimits(),
-        records=(*found.records, *(sequences.records if sequences else ())),
+        flow_laws=_laws_of_flow(source),
+        limits=_limits(table, source),
+        records=tuple(records),
         titles=source.titles,
         branch_names=source.branch_names,
         unit_names=source.unit_names,
         regions=Regions.telling(source.regions, buses),
-        device_loads=tuple(x.name for x in found.device_loads),
+        device_loads=device_loads,
         file_loads=found.file_loads,
         controls=found.controls,
         counted_controls=found.counted_controls,
-        sequences=sequences.data if sequences else _without_file(found),
+        sequences=_without_file(found) if sequences is None else sequences.data,
         dc_lines=found.dc_lines,
-        merged=found.raw.same if found.raw else {},
+        merged=merged,
     )
 
 
@@ -219,6 +219,23 @@ def _loads_of_file(table: NetworkTable, directory: Path) -> list[Load]:
         for row in rows
     )
     return [with_laws(load, table) for load in loads]
+
+
+def _ends_of(lines: Sequence[Line], transformers: Sequence[ThreeWinding]) -> dict[str, None]:
+    """The buses at the ends of branches, which a network has that lists none."""
+    ends = [bus for line in lines for bus in (line.from_bus, line.to_bus)]
+    return dict.fromkeys([*ends, *(bus for x in transformers for bus in x.buses)])
+
+
+def _laws_of_flow(source: ImportedNetwork) -> dict[str, FlowLaws]:
+    """Laws of the loads of which a source tells constant impedances and currents."""
+    parts = source.load_parts
+    return {x.name: flow_laws(x, parts[x.name]) for x in source.loads if x.name in parts}
+
+
+def _limits(table: NetworkTable, source: ImportedNetwork) -> FileLimits:
+    """Ratings and bands of a RAW or MATPOWER file; those of other sources are not meant."""
+    return source.limits if table.raw or table.matpower else FileLimits()
 
 
 def _sequences(
@@ -362,18 +379,7 @@ def _read_from_raw(asked: _Asked) -> _Source:
             "no generator is in service, so nothing feeds the network and nothing can "
             "swing; give a case with generators",
         )
-    own, changes = raw.tables.frequency, list(raw.changes)
-    if own is None and table.frequency is None:
-        text = f"BASFRQ, the sixth value, is missing or 0: {_FREQUENCY:g} Hz are taken"
-        changes.append(
-            Problem(
-                f"{raw.tables.name}, line 1",
-                f"{text}; if it is another, write it, such as {with_frequency(50.0)}",
-            )
-        )
-    if table.frequency is not None and own is not None and own != table.frequency:
-        text = f"BASFRQ is {own:g} Hz, and the case's frequency = {table.frequency:g} Hz counts; one of them is wrong"
-        changes.append(Problem(f"{raw.tables.name}, line 1", text))
+    changes = [*raw.changes, *_doubts_on_frequency(raw.tables, table.frequency)]
     # the machines are those of the file
     needed = {bus for device in raw.devices for bus in device.places}
     imported = import_network(raw.tables, joined=False, needed=needed)
@@ -383,10 +389,7 @@ def _read_from_raw(asked: _Asked) -> _Source:
     imported = part.network
     left = {x for x in raw.machines if bus_name(str(x.bus)) in part.left_buses}
     machines = tuple(x for x in raw.machines if x not in left)
-    ratings: dict[str, float] = {}
-    for machine in machines:
-        bus = bus_name(raw.tables.labels[machine.bus])
-        ratings[bus] = ratings.get(bus, 0.0) + machine.likely_mva
+    ratings = _ratings(machines, raw.tables.labels)
     changes += [Problem(raw.tables.name, text) for text in part_notes(part)]
     if imported.slack is None and slack is None and ratings:
         largest = max((bus for bus in ratings if bus in part.buses), key=ratings.__getitem__)
@@ -425,6 +428,28 @@ def _read_from_raw(asked: _Asked) -> _Source:
         counted_controls=moving.counts_in_words,
         raw=raw,
     )
+
+
+def _doubts_on_frequency(file: SourceTables, given: float | None) -> list[Problem]:
+    """Ask about a rated frequency [Hz] that the file does not say, or of which the case says another."""
+    own, place = file.frequency, f"{file.name}, line 1"
+    if own is None and given is None:
+        text = f"BASFRQ, the sixth value, is missing or 0: {_FREQUENCY:g} Hz are taken"
+        remedy = f"if it is another, write it, such as {with_frequency(50.0)}"
+        return [Problem(place, f"{text}; {remedy}")]
+    if given is not None and own is not None and own != given:
+        text = f"BASFRQ is {own:g} Hz, and the case's frequency = {given:g} Hz counts; one of them is wrong"
+        return [Problem(place, text)]
+    return []
+
+
+def _ratings(machines: Iterable[Machine], labels: Mapping[int, str]) -> dict[str, float]:
+    """Likely ratings of machines [MVA], together by bus."""
+    ratings: dict[str, float] = {}
+    for machine in machines:
+        bus = bus_name(labels[machine.bus])
+        ratings[bus] = ratings.get(bus, 0.0) + machine.likely_mva
+    return ratings
 
 
 def _with_words(

@@ -19,7 +19,10 @@ from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import few
 
 _TEMPLATE = Path(__file__).with_suffix(".txt").read_text(encoding="utf-8")
-_EMT_STEP = 1e-4
+_EMT_STEP = 1e-4  # [s]
+_STEPS = {"emt": "100 us", "phasor": "2 ms"}
+"""Communication step that a new case has, by the kind of its models."""
+
 _MOST_CURVES = 12
 _MOST_MOVES = 5  # of taps and shunts that are named; the others are counted
 _EMF = """emf w·e''; [conventions] like = "psse" takes PSS/E's e'', which moves dampings by tenths of a point"""
@@ -142,65 +145,120 @@ class CaseText:
 
     @property
     def text(self) -> str:
-        w, places = self._wanted, self._places
-        key = next(key for key in self._sources if key not in ("dyr", "seq", "units"))
-        kind, other = w.kind, "phasor" if w.kind == "emt" else "emt"
-        steps = {"emt": "100 us", "phasor": "2 ms"}
-        stray = {
-            "emt": f"stray_B = {self._stray:g}             # pu on 100 MVA{self._stray_why}\n",
-            "phasor": "stray_B = 0                 # no bus needs any\n",
-        }
-        both = f'models = "{kind}"           # the same with the others: --set models={other}\n'
-        rest = f"\n[{other}]                       # what --set models={other} takes instead\n"
-        rest += f'step_size = "{steps[other]}"\n'
-        kept = "\nkeep_load_parts = true      # IP, IQ stay constant currents, YP, YQ constant impedances"
-        own = f"    # {_EMF}" if kind == "phasor" else ""
-        dyr = "generator_parameters = { transformer.X_t = 0.0, transformer.R_t = 0.0 }    # the network has it"
-        dyr = f"dyr = {self._path(self._sources['dyr'])}{own}" if "dyr" in self._sources else dyr
-        dyr = (
-            f"file = {self._path(self._sources['units'])}\n{dyr}"
-            if "units" in self._sources
-            else dyr
-        )
-        lines = self._network is not None and any(
-            x.name.startswith("line_") for x in self._network.lines
-        )
+        w = self._wanted
+        name = re.sub(r"[^0-9A-Za-z_]+", "_", w.out.stem).strip("_") or "case"
+        sources = [path.name for path in self._sources.values()]
+        tables = self._tables()
+        scenarios = ["\n".join([*block, ""]) for block in [*self._scenarios(), *self._plots()]]
+        grid, suffix = ("grid", "") if w.kind == "emt" else ("phasor_grid", "_phasor")
         return _TEMPLATE.format(
             command=w.command,
-            name=_quoted(re.sub(r"[^0-9A-Za-z_]+", "_", w.out.stem).strip("_") or "case"),
-            title=_quoted(self._sources[key].name + self._with_converters),
-            source=_quoted(", ".join(path.name for path in self._sources.values())),
-            models=both if w.device is None else "",
-            step=steps[kind],
-            record=', "grid.*.fault.*"' * bool(self._fault_bus)
-            + ', "grid.line_*.p"' * lines
-            + "".join(f', "{place.name}.*"' for place in places),
-            other=rest + stray[other] if w.device is None else "",
-            slack=(f"\nslack = {_quoted(w.slack)}" if w.slack else "")
-            + "\nreactive_limits = true" * w.reactive_limits,
-            grid="grid" if kind == "emt" else "phasor_grid",
+            name=_quoted(name),
+            title=_quoted(self._sources[self._key].name + self._with_converters),
+            source=_quoted(", ".join(sources)),
+            models=self._models(),
+            step=_STEPS[w.kind],
+            record=self._record(),
+            other=self._other_models(),
+            slack=self._slack(),
+            grid=grid,
             moved=self._positions(),
-            network=self._tables()
-            or f"{key} = {self._path(self._sources[key])}"
-            + kept * (key == "raw" and w.load_parts)
-            + "\nmove_controls = true        # taps and switched shunts move after an outage"
-            * w.move_controls,
-            loads="" if self._tables() else "# ",
-            more=self._sequences()
-            + (f"frequency = {_quoted(w.frequency)}\n" if w.frequency else "")
-            + stray["emt"] * (kind == "emt")
-            + (f"leave_out = {_toml_list(w.leave_out)}\n" if w.leave_out else ""),
-            units=dyr
-            + (f"\ndyr_leave_out = {_toml_list(w.dyr_leave_out)}" if w.dyr_leave_out else "")
-            + "\ndyr_approximate = true" * w.dyr_approximate
-            + (f"\nreplace = {_toml_list(w.replace)}" if w.replace else ""),
+            network=tables or self._file_of_network(),
+            loads="" if tables else "# ",
+            more=self._about_network(),
+            units=self._units(),
             generator="" if "dyr" in self._sources else "_st1",
-            suffix="" if kind == "emt" else "_phasor",
+            suffix=suffix,
             converter=self._converter(),
-            scenarios="\n".join(
-                "\n".join([*block, ""]) for block in [*self._scenarios(), *self._plots()]
-            ),
+            scenarios="\n".join(scenarios),
         )
+
+    @property
+    def _key(self) -> str:
+        """The key of ``[network]`` that names the network's file."""
+        return next(key for key in self._sources if key not in ("dyr", "seq", "units"))
+
+    @property
+    def _other_kind(self) -> str:
+        """The models that the case does not take."""
+        return "phasor" if self._wanted.kind == "emt" else "emt"
+
+    def _models(self) -> str:
+        """The line that chooses the models; none with a device, which is of one kind."""
+        if self._wanted.device is not None:
+            return ""
+        other = f"# the same with the others: --set models={self._other_kind}"
+        return f'models = "{self._wanted.kind}"           {other}\n'
+
+    def _other_models(self) -> str:
+        """The table that the other models take instead."""
+        if self._wanted.device is not None:
+            return ""
+        other = self._other_kind
+        heading = f"\n[{other}]                       # what --set models={other} takes instead\n"
+        return f'{heading}step_size = "{_STEPS[other]}"\n{self._stray_line(other)}'
+
+    def _stray_line(self, kind: str) -> str:
+        if kind == "phasor":
+            return "stray_B = 0                 # no bus needs any\n"
+        return f"stray_B = {self._stray:g}             # pu on 100 MVA{self._stray_why}\n"
+
+    def _record(self) -> str:
+        """Further signals to record."""
+        signals = []
+        if self._fault_bus:
+            signals.append("grid.*.fault.*")
+        if self._network and any(x.name.startswith("line_") for x in self._network.lines):
+            signals.append("grid.line_*.p")
+        signals += [f"{place.name}.*" for place in self._places]
+        return "".join(f', "{signal}"' for signal in signals)
+
+    def _slack(self) -> str:
+        """Further lines of ``[power_flow]``."""
+        lines = ""
+        if self._wanted.slack:
+            lines += f"\nslack = {_quoted(self._wanted.slack)}"
+        if self._wanted.reactive_limits:
+            lines += "\nreactive_limits = true"
+        return lines
+
+    def _file_of_network(self) -> str:
+        """The line of ``[network]`` that names its file, and how that is read."""
+        lines = f"{self._key} = {self._path(self._sources[self._key])}"
+        if self._key == "raw" and self._wanted.load_parts:
+            lines += "\nkeep_load_parts = true      # IP, IQ stay constant currents, YP, YQ constant impedances"
+        if self._wanted.move_controls:
+            lines += "\nmove_controls = true        # taps and switched shunts move after an outage"
+        return lines
+
+    def _about_network(self) -> str:
+        """The last lines of ``[network]``."""
+        w, lines = self._wanted, self._sequences()
+        if w.frequency:
+            lines += f"frequency = {_quoted(w.frequency)}\n"
+        if w.kind == "emt":
+            lines += self._stray_line("emt")
+        if w.leave_out:
+            lines += f"leave_out = {_toml_list(w.leave_out)}\n"
+        return lines
+
+    def _units(self) -> str:
+        """The first lines of ``[units]``: where the machines are from."""
+        w, lines = self._wanted, ""
+        if "units" in self._sources:
+            lines += f"file = {self._path(self._sources['units'])}\n"
+        if "dyr" not in self._sources:
+            lines += "generator_parameters = { transformer.X_t = 0.0, transformer.R_t = 0.0 }    # the network has it"
+        else:
+            own = f"    # {_EMF}" if w.kind == "phasor" else ""
+            lines += f"dyr = {self._path(self._sources['dyr'])}{own}"
+        if w.dyr_leave_out:
+            lines += f"\ndyr_leave_out = {_toml_list(w.dyr_leave_out)}"
+        if w.dyr_approximate:
+            lines += "\ndyr_approximate = true"
+        if w.replace:
+            lines += f"\nreplace = {_toml_list(w.replace)}"
+        return lines
 
     def _sequences(self) -> str:
         """The line that names the file of the negative and the zero sequence."""

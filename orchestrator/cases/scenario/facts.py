@@ -3,10 +3,12 @@
 from dataclasses import dataclass
 
 from fmus.grid.element_data import Load
+from orchestrator.cases.flow.power_flow import PowerFlow
 from orchestrator.cases.networks.load_models import in_words
 from orchestrator.cases.scenario.drawing_devices import LOAD, drawn_mw, is_dc_terminal, with_motors
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import number_of
+from orchestrator.systems.coupling.system import ComponentPlan
 
 # keys of ``[network]`` that name another program's data
 SOURCES = ("raw", "matpower", "pandapower", "cgmes")
@@ -33,29 +35,36 @@ class Facts:
     voltages_pu: tuple[float, float]  # least and largest magnitude
 
     def sentence(self) -> str:
-        units = [
-            number_of(n, what)
-            for n, what in (
-                (self.machines, "machine"),
-                (self.converters, "converter"),
-                (self.motors, "motor"),
-                (self.dc_terminals, "DC terminal"),
-                (self.others, "other device"),
-            )
-            if n
-        ]
-        slack = ", ".join(f"{n} at {p:.4g} MW ({100 * p / S_n:.0f} %)" for n, p, S_n in self.slack)
-        parts = [
-            "phasor models" if self.phasors else "EMT models",
-            *([f"{self.frequency_hz:g} Hz"] if self.frequency_hz else []),
-            number_of(self.buses, "bus"),
-            *units,
-            *(["no governor"] if self.machines and not self.governed else []),
-            f"{self.load_mw:.5g} MW of load ({self.load_model})",
-            *([f"slack {slack}"] if slack else []),
-            "voltages {:.3g} to {:.3g} pu".format(*self.voltages_pu),
-        ]
+        counts = {
+            "machine": self.machines,
+            "converter": self.converters,
+            "motor": self.motors,
+            "DC terminal": self.dc_terminals,
+            "other device": self.others,
+        }
+        parts = ["phasor models" if self.phasors else "EMT models"]
+        if self.frequency_hz:
+            parts.append(f"{self.frequency_hz:g} Hz")
+        parts.append(number_of(self.buses, "bus"))
+        parts += [number_of(count, kind) for kind, count in counts.items() if count]
+        if self.machines and not self.governed:
+            parts.append("no governor")
+        parts.append(f"{self.load_mw:.5g} MW of load ({self.load_model})")
+        if self.slack:
+            units = [f"{n} at {p:.4g} MW ({100 * p / S_n:.0f} %)" for n, p, S_n in self.slack]
+            parts.append(f"slack {', '.join(units)}")
+        parts.append("voltages {:.3g} to {:.3g} pu".format(*self.voltages_pu))
         return f"{', '.join(self.sources)}: {', '.join(parts)}"
+
+
+def _is_governed(machine: ComponentPlan) -> bool:
+    return any(v.startswith("governor.T_") for v in machine.description.variables)
+
+
+def _feeding(name: str, unit: ComponentPlan, flow: PowerFlow) -> tuple[str, float, float]:
+    """A unit's name, its power [MW] and its rating [MVA]."""
+    S_n = unit.number("S_n")
+    return name, flow.powers[name].real * S_n, S_n
 
 
 def facts_of(prepared: PreparedScenario) -> Facts | None:
@@ -76,30 +85,29 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
     drawing = drawn_mw(plans)
     others = sum(plans[n].kind == LOAD for n in feeding)
     terminals = [n for n in feeding if is_dc_terminal(plans[n])]
+    motors = sum(n in drawing for n in feeding)
     magnitudes = [abs(flow.voltages[bus]) for bus in network.buses]
     loads = [
         (x, grid.number(f"{x.name}.scale") * grid.number(f"{x.name}.P")) for x in network.loads
     ]
+    drawn = [p for _, p in loads if p > 0]
+    laws = _laws([load for load, p in loads if p > 0])
     dyr = [table.units.dyr] if table.units is not None and table.units.dyr is not None else []
+    phasors = any(name.endswith(".y_re") for name in grid.description.inputs)
     return Facts(
         (*sources, *dyr),
-        any(name.endswith(".y_re") for name in grid.description.inputs),
+        phasors,
         frequency_hz=rated_frequency(prepared),
         buses=len(network.buses),
         machines=len(machines),
         converters=len(feeding) - len(machines) - others,
-        others=others - len(terminals) - sum(n in drawing for n in feeding),
-        motors=sum(n in drawing for n in feeding),
+        others=others - len(terminals) - motors,
+        motors=motors,
         dc_terminals=len(terminals),
-        governed=any(
-            v.startswith("governor.T_") for n in machines for v in plans[n].description.variables
-        ),
-        load_mw=sum(p for _, p in loads if p > 0) + sum(drawing.values()),
-        load_model=with_motors(_laws([load for load, p in loads if p > 0]), plans),
-        slack=tuple(
-            (n, flow.powers[n].real * plans[n].number("S_n"), plans[n].number("S_n"))
-            for n in at_slack
-        ),
+        governed=any(_is_governed(plans[n]) for n in machines),
+        load_mw=sum(drawn) + sum(drawing.values()),
+        load_model=with_motors(laws, plans),
+        slack=tuple(_feeding(n, plans[n], flow) for n in at_slack),
         voltages_pu=(min(magnitudes), max(magnitudes)),
     )
 

@@ -21,6 +21,7 @@ from orchestrator.cases.form.parameter_files import ParameterFile
 from orchestrator.cases.form.schema import ComponentTable, ReferenceModeTable, Value
 from orchestrator.cases.networks.areas import in_two_areas
 from orchestrator.cases.networks.branch_limits import FileLimits
+from orchestrator.cases.networks.data import NetworkData
 from orchestrator.cases.networks.element_names import ElementNames, names_of
 from orchestrator.cases.networks.load_models import in_words, open_question
 from orchestrator.cases.networks.record_use import RecordUse
@@ -327,12 +328,10 @@ class Preparer:
         self._build()
         every, about_rows = record_every(draft, clock, stop)
         record, left_out = recorded(draft)
+        data = draft.data or NetworkData()
         loads = draft.network.loads if draft.network else ()
         draft.found.questions += open_question(
-            draft.given.case.network,
-            loads,
-            draft.data.recorded_loads if draft.data else (),
-            draft.given.place("network"),
+            draft.given.case.network, loads, data.recorded_loads, draft.given.place("network")
         )
         draft.found.questions += [
             *doubts(draft.given.case, draft.given.place),
@@ -340,6 +339,9 @@ class Preparer:
         ]
         plans = draft.system.components
         values = {f"{n}.{v}": x for n, p in plans.items() for v, x in p.parameters.items()}
+        given: dict[str, Value] = {}
+        for layer in draft.given.layers:
+            given |= layer.given
         return PreparedScenario(
             self._case,
             draft.given.name,
@@ -364,24 +366,22 @@ class Preparer:
             places={name: draft.place_of_component(name) for name in plans},
             not_reached=tuple(sorted(draft.found.not_reached)),
             faults=tuple(draft.found.faults),
-            source_slack=draft.data.slack if draft.data else None,
-            file_limits=draft.data.limits if draft.data else FileLimits(),
-            file_voltages=draft.data.file_voltages if draft.data else FileVoltages(),
-            titles=draft.data.titles if draft.data else {},
+            source_slack=data.slack,
+            file_limits=data.limits,
+            file_voltages=data.file_voltages,
+            titles=data.titles,
             names=_names(draft),
-            regions=draft.data.regions if draft.data else Regions(),
-            recorded_loads=draft.data.recorded_loads if draft.data else frozenset(),
+            regions=data.regions,
+            recorded_loads=data.recorded_loads,
             base_ratings=draft.base_ratings,
-            following_loads=tuple(draft.data.flow_laws) if draft.data else (),
-            moving=tuple(x.variable for x in draft.data.controls) if draft.data else (),
-            counted_controls=draft.data.counted_controls if draft.data else "",
-            device_loads=draft.data.device_loads if draft.data else (),
+            following_loads=tuple(data.flow_laws),
+            moving=tuple(control.variable for control in data.controls),
+            counted_controls=data.counted_controls,
+            device_loads=data.device_loads,
             idle=idle_values(
                 draft.system, draft.given.from_outside, draft.places, events, draft.found.absent
             ),
-            given={
-                key: value for layer in draft.given.layers for key, value in layer.given.items()
-            },
+            given=given,
         )
 
     def _add_component(self, name: str, table: ComponentTable) -> None:

@@ -230,15 +230,12 @@ def _set_following(
 
 
 def _shunts(network: Network, grid: ComponentPlan) -> list[FlowShunt]:
-    shunts = [
-        FlowShunt(
-            shunt.bus,
-            g=grid.number(f"{shunt.name}.G") / SYSTEM_BASE_MVA * closed if shunt.g_mw else 0.0,
-            b=_susceptance(shunt, grid, closed) if shunt.b_mvar else 0.0,
-        )
-        for shunt in network.shunts
-        for closed in (not shunt.switched or is_connected(grid, f"{shunt.name}.connected"),)
-    ]
+    shunts = []
+    for shunt in network.shunts:
+        closed = not shunt.switched or is_connected(grid, f"{shunt.name}.connected")
+        g = grid.number(f"{shunt.name}.G") / SYSTEM_BASE_MVA * closed if shunt.g_mw else 0.0
+        b = _susceptance(shunt, grid, closed) if shunt.b_mvar else 0.0
+        shunts.append(FlowShunt(shunt.bus, g=g, b=b))
     stray = [bus for bus in network.buses if network.needs_stray(bus)]
     shunts += _charged_lines(network, grid)
     return shunts + [FlowShunt(bus, g=0.0, b=grid.number("stray_B"), stray=True) for bus in stray]

@@ -333,6 +333,11 @@ def _describe(
         names = None if known is None else tuple(d.name for d in known)
         dependencies[unknown.variable.name] = names
     discrete = _discrete_states(path, root, md)
+    states = (*_states(path, md), *discrete)
+    step_size = stop_time = None
+    if md.defaultExperiment:
+        step_size = _positive(md.defaultExperiment.stepSize)
+        stop_time = _positive(md.defaultExperiment.stopTime)
     return FmuDescription(
         path=path,
         guid=md.guid,
@@ -341,7 +346,7 @@ def _describe(
         model_identifier=md.coSimulation.modelIdentifier,
         generation_tool=one_line(md.generationTool or ""),
         variables=variables,
-        states=(*_states(path, md), *discrete),
+        states=states,
         states_are_settable=_settable(root, version) or bool(discrete),
         can_save_state=bool(md.coSimulation.canGetAndSetFMUstate),
         gives_directional_derivatives=_gives_directional_derivatives(root),
@@ -350,11 +355,9 @@ def _describe(
         can_serialize_state=bool(md.coSimulation.canSerializeFMUstate),
         needs_tool=bool(md.coSimulation.needsExecutionTool),
         one_instance=bool(md.coSimulation.canBeInstantiatedOnlyOncePerProcess),
-        default_step_size=_positive(md.defaultExperiment.stepSize)
-        if md.defaultExperiment
-        else None,
+        default_step_size=step_size,
         units=_units(root),
-        stop_time=_positive(md.defaultExperiment.stopTime) if md.defaultExperiment else None,
+        stop_time=stop_time,
         fmi_version=version,
         rates=tuple(unknown.variable.name for unknown in md.derivatives),
         kind=kind,

@@ -28,6 +28,7 @@ from orchestrator.cases.networks.element_names import BranchName
 from orchestrator.cases.networks.regions import Region
 from orchestrator.cases.networks.source_changes import Changes
 from orchestrator.cases.networks.sources import SourceTables
+from orchestrator.core.arrays import Matrix
 from orchestrator.core.errors import InputError, Problem, few
 from orchestrator.core.foreign_files import one_line
 
@@ -131,26 +132,7 @@ class _Reading:
         self._boundaries()
         self._taps()
         gen = self._generators()
-        numbers = self._numbers
-        rows = [
-            [numbers[b.start], numbers[b.end], b.z.real, b.z.imag, 0, 0, 0, 0, b.tap, b.shift, 1]
-            for b in self._branches
-        ]
-        tables = SourceTables(
-            name=self._place,
-            base_mva=BASE_MVA,
-            bus=np.array(self._rows),
-            branch=np.array(rows, dtype=float).reshape(-1, 11),
-            gen=gen,
-            branch_to_earth=np.array([b.to_earth for b in self._branches], dtype=complex).reshape(
-                -1, 2
-            ),
-            labels={number: self._labels[bus] for bus, number in numbers.items()},
-            titles={numbers[bus]: title for bus, title in self._titles.items() if bus in numbers},
-            branch_names=tuple(BranchName(self._title_of(b.name)) for b in self._branches),
-            regions={numbers[bus]: x for bus, x in self._regions.items() if bus in numbers},
-            feeding={n: fed for n, x in self._loads.items() if (fed := x.apart().feeding).power},
-        )
+        tables = self._tables(gen)
         ratings: dict[str, float] = {}
         for row in gen:
             label = tables.labels[int(row[0])]
@@ -159,6 +141,32 @@ class _Reading:
             tables,
             tuple(self._changes.as_problems()),
             {n: r for n, r in ratings.items() if r < _MOST_RATING},
+        )
+
+    def _tables(self, generators: Matrix) -> SourceTables:
+        """Everything read so far, as tables of buses by their numbers."""
+        numbers = self._numbers
+        branches = [
+            [numbers[b.start], numbers[b.end], b.z.real, b.z.imag, 0, 0, 0, 0, b.tap, b.shift, 1]
+            for b in self._branches
+        ]
+        to_earth = np.array([b.to_earth for b in self._branches], dtype=complex)
+        labels = {number: self._labels[bus] for bus, number in numbers.items()}
+        titles = {numbers[bus]: title for bus, title in self._titles.items() if bus in numbers}
+        regions = {numbers[bus]: x for bus, x in self._regions.items() if bus in numbers}
+        feeding = {number: loads.apart().feeding for number, loads in self._loads.items()}
+        return SourceTables(
+            name=self._place,
+            base_mva=BASE_MVA,
+            bus=np.array(self._rows),
+            branch=np.array(branches, dtype=float).reshape(-1, 11),
+            gen=generators,
+            branch_to_earth=to_earth.reshape(-1, 2),
+            labels=labels,
+            titles=titles,
+            branch_names=tuple(BranchName(self._title_of(b.name)) for b in self._branches),
+            regions=regions,
+            feeding={number: fed for number, fed in feeding.items() if fed.power},
         )
 
     def _refuse(self, leaving_out: Sequence[str]) -> None:

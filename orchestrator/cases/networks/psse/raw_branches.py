@@ -24,52 +24,59 @@ _SAME_VOLTAGE = 0.1  # part by which the nominal voltages at a line's ends may d
 
 
 def read_lines(net: RawTables) -> None:
+    """Add the branches and the switching devices that are in service, and ask about data that look wrong."""
     ends = net.column_of_ends
     for record in net.raw.of("branch"):
-        if record.line in net.merged or not is_in_service(record, ends + 4, "ST"):
-            continue
-        start, end = net.bus(record), net.bus(record, 1)
-        pair = frozenset((net.own_bus(record), net.own_bus(record, 1)))
-        if len(pair) == 1:
-            text = "a line from a bus to itself: not used, as the file's own solution has it"
-            net.changes.note(record.line, text)
-            continue
-        circuit = _circuit(net, record, pair)
-        z = complex(record.number(3, "R", 0.0), record.number(4, "X"))
-        z = 1j * net.least_reactance if record.line in net.lossless else z
-        charging = 0.5j * record.number(5, "B", 0.0)
-        gi, bi, gj, bj = (
-            record.number(ends + k, n, 0.0) for k, n in enumerate(("GI", "BI", "GJ", "BJ"))
-        )
-        state = record.whole(ends + 4, "ST", 1)
-        one, other = net.kilovolts[start], net.kilovolts[end]
-        if state and one and other and abs(one - other) > _SAME_VOLTAGE * max(one, other):
-            text = f"line between buses of BASKV = {one:g} and {other:g} kV: is one wrong, or a transformer meant?"
-            net.changes.note(record.line, text)
-        net.ohms.append((record.line, z.imag, one))
-        to_earth = (charging + complex(gi, bi), charging + complex(gj, bj))
-        # a name stands before the ratings from revision 34 on
-        column = 6 if net.raw.revision < SWITCHING_DEVICES else 7
-        rating = record.number(column, "RATEA [MVA]", 0.0)
-        name = BranchName(record.text(6, "").strip() if column == 7 else "", circuit)
-        own = net.own_bus(record), net.own_bus(record, 1)
-        key = BranchKey(own, circuit, kilovolts=(one, other))
-        net.add_branch(start, end, z, state, to_earth, rating=rating, name=name, key=key)
+        if record.line not in net.merged and is_in_service(record, ends + 4, "ST"):
+            _add_line(net, record)
     for record in net.raw.of("system switching device"):
-        if record.line in net.merged or not is_in_service(record, SWITCH_STATE, "STAT"):
-            continue
-        start, end = net.bus(record), net.bus(record, 1)
-        net.changes.note(record.line, "switching device: a branch of its reactance")
-        net.add_branch(start, end, complex(0.0, reactance_of_switch(record)), 1)
+        if record.line not in net.merged and is_in_service(record, SWITCH_STATE, "STAT"):
+            start, end = net.bus(record), net.bus(record, 1)
+            net.changes.note(record.line, "switching device: a branch of its reactance")
+            net.add_branch(start, end, complex(0.0, reactance_of_switch(record)), 1)
     if net.raw.base_mva != _SBASE:
         text = f"SBASE is {net.raw.base_mva:g} MVA, on which all impedances count; nearly all files have"
         net.changes.note(1, f"{text} {_SBASE:g} MVA: is it meant?")
+    _question_ohms(net)
+
+
+def _add_line(net: RawTables, record: Record) -> None:
+    ends = net.column_of_ends
+    start, end = net.bus(record), net.bus(record, 1)
+    pair = frozenset((net.own_bus(record), net.own_bus(record, 1)))
+    if len(pair) == 1:
+        text = "a line from a bus to itself: not used, as the file's own solution has it"
+        net.changes.note(record.line, text)
+        return
+    circuit = _circuit(net, record, pair)
+    z = complex(record.number(3, "R", 0.0), record.number(4, "X"))
+    z = 1j * net.least_reactance if record.line in net.lossless else z
+    charging = 0.5j * record.number(5, "B", 0.0)
+    gi, bi, gj, bj = (
+        record.number(ends + k, n, 0.0) for k, n in enumerate(("GI", "BI", "GJ", "BJ"))
+    )
+    state = record.whole(ends + 4, "ST", 1)
+    one, other = net.kilovolts[start], net.kilovolts[end]
+    if state and one and other and abs(one - other) > _SAME_VOLTAGE * max(one, other):
+        text = f"line between buses of BASKV = {one:g} and {other:g} kV: is one wrong, or a transformer meant?"
+        net.changes.note(record.line, text)
+    net.ohms.append((record.line, z.imag, one))
+    to_earth = (charging + complex(gi, bi), charging + complex(gj, bj))
+    # a name stands before the ratings from revision 34 on
+    column = 6 if net.raw.revision < SWITCHING_DEVICES else 7
+    rating = record.number(column, "RATEA [MVA]", 0.0)
+    name = BranchName(record.text(6, "").strip() if column == 7 else "", circuit)
+    own = net.own_bus(record), net.own_bus(record, 1)
+    key = BranchKey(own, circuit, kilovolts=(one, other))
+    net.add_branch(start, end, z, state, to_earth, rating=rating, name=name, key=key)
+
+
+def _question_ohms(net: RawTables) -> None:
+    """Ask about reactances of lines that are far above the others, and usual if they are read in ohms."""
     usual = sorted(abs(x) for _, x, _ in net.ohms)
     for line, x, kilovolts in net.ohms:
-        middle, ohms = (
-            usual[len(usual) // 2],
-            x * net.raw.base_mva / kilovolts**2 if kilovolts else 0.0,
-        )
+        middle = usual[len(usual) // 2]
+        ohms = x * net.raw.base_mva / kilovolts**2 if kilovolts else 0.0
         if x > _FAR * middle and middle / _FAR < ohms < _FAR * middle:
             text = f"X is {x:g} pu, {x / middle:.3g} times the middle one of all lines; is it in ohms? On "
             net.changes.note(line, f"{text}{kilovolts:g} kV these are {ohms:.3g} pu")

@@ -222,6 +222,11 @@ def negative_sequence(subject: Subject) -> CheckResult:
     if late.remainder > _SWINGS and late.remainder > _DECAYS * before.remainder:
         how = f"its current swings by {late.remainder:.3g} pu r.m.s. at other frequencies, and that does not decay"
         return failed("negative_sequence", "keeps moving", f"{how}; {seen}", **figures)
+    return _judge_admittances(subject, seen, figures)
+
+
+def _judge_admittances(subject: Subject, seen: str, figures: dict[str, Any]) -> CheckResult:
+    """Measure the admittance to both sequences; a device that feeds the negative one at f_n is remarked on."""
     negative, positive = (_admittance(subject, negative=which) for which in (True, False))
     hertz = list(negative.own)[_NEGATIVE_LINES.index(_OF_RATED)]
     y = negative.own[hertz]
@@ -231,10 +236,8 @@ def negative_sequence(subject: Subject) -> CheckResult:
     seen += f"{negative.coupled[hertz]:.2g} pu of positive sequence at {3 * hertz:g} Hz"
     active = [f for f, value in negative.own.items() if value.real < _ACTIVE]
     if active:
-        where, least = (
-            ", ".join(f"{f:g}" for f in active),
-            min(negative.own[f].real for f in active),
-        )
+        where = ", ".join(f"{f:g}" for f in active)
+        least = min(negative.own[f].real for f in active)
         seen += f"; at {where} Hz it feeds the negative sequence, with a conductance down to {least:.3g} pu"
     if hertz in active:
         remedy = "a network that damps little swings with it: ask how its negative sequence is controlled"
