@@ -34,6 +34,7 @@ from orchestrator.core.uncollected import uncollected
 from orchestrator.systems.coupling.no_trip_regions import NoTripCode
 
 if TYPE_CHECKING:
+    from orchestrator.cases.draft import Draft
     from orchestrator.cases.events import event_tables
     from orchestrator.cases.flow import sharing
     from orchestrator.cases.flow.sharing import Dispatch
@@ -112,78 +113,94 @@ class Case(CaseDefinition):
                 dispatch=dispatch,
                 voltages_before=voltages_before,
             )
-        problems = list(self.problems)
-        unknown = [name for name in scenarios if name not in self.scenarios]
-        has = f"the case has: {', '.join(self.scenarios)}"
-        problems += [
-            Problem(Option.SCENARIO, f"there is no scenario {name!r}; {has}") for name in unknown
-        ]
-        doubles = [name for name, count in Counter(scenarios).items() if count > 1]
-        twice = "is chosen more than once; name it once"
-        problems += [Problem(Option.SCENARIO, f"the scenario {name!r} {twice}") for name in doubles]
-        if unknown or doubles:
-            raise CaseError(self.source, problems)
-        prepared, questions, named = [], [*self.questions], mentions.Named()
+        self._check_choice(scenarios)
+        values = overrides or {}
+        problems, questions = [*self.problems], [*self.questions]
+        prepared, named = [], mentions.Named()
         for name in scenarios or self.scenarios:
-            preparer = self._preparer(name, overrides, parameters)
-            follow = voltages_before is None and preparer.draft.reacts
-            shares = dispatch is None and not any(k.endswith(".P_0") for k in overrides or {})
-            before = (
-                self._before_outage(name, overrides or {}, parameters) if follow or shares else None
+            preparer = self._preparer(name, values, parameters)
+            draft = preparer.draft
+            draft.dispatch, draft.voltages_before = dispatch, voltages_before or {}
+            lost = self._look_before_outage(
+                draft,
+                values,
+                parameters,
+                shares=dispatch is None,
+                follows=voltages_before is None,
             )
-            lost, shared = (
-                self._switched_off(name, before, overrides or {}, parameters)
-                if shares and before is not None
-                else ((), dispatch)
-            )
-            preparer.draft.dispatch = shared
-            preparer.draft.voltages_before = voltages_before or {}
-            if follow and before is not None and before.power_flow is not None:
-                preparer.draft.voltages_before = before.power_flow.voltages
-                preparer.draft.loads_as_given = self._loads_as_given(before, overrides or {})
-            prepared.append(
-                _with_feeders_of_loss(preparer.prepare(step_size, stop_time), lost, shared)
-            )
-            named.add(preparer.draft)
+            ready = preparer.prepare(step_size, stop_time)
+            prepared.append(_with_feeders_of_loss(ready, lost, draft.dispatch))
+            named.add(draft)
             problems += [p for p in preparer.problems if p not in problems]
-            questions += [q for q in preparer.draft.found.questions if q not in questions]
+            questions += [q for q in draft.found.questions if q not in questions]
         if not problems and self.numbered and mentions.unmatched(self.table, named, self.place):
             problems += self._mentions
-        problems += (
-            []
-            if problems
-            else self._switched_on([p for p in prepared if p], parameters, overrides or {})
-        )
-        if problems:  # unusual data may be the reason of the failure
-            kind = problems[0].kind  # a question besides is of no kind of its own
-            by_text: dict[str, Problem] = {}
-            for question in questions:
-                by_text.setdefault(question.text, question)
-            asked = [
-                Problem(by_text[first].place, f"questioned besides: {line}", kind, besides=True)
-                for first, line in by_kind(by_text).items()
-            ]
-            raise CaseError(self.source, [*problems, *asked])
+        found = [p for p in prepared if p is not None]
+        if not problems:
+            problems += self._switched_on(found, parameters, values)
+        if problems:
+            raise CaseError(self.source, [*problems, *_besides(problems, questions)])
         if scenarios and self.numbered:
-            others = event_tables.other_scenarios(preparer.draft, scenarios)
-            prepared[-1] = prepared[-1] and replace(
-                prepared[-1], questions=(*prepared[-1].questions, *others)
-            )
+            others = event_tables.other_scenarios(draft, scenarios)
+            found[-1] = replace(found[-1], questions=(*found[-1].questions, *others))
         beside = partial(self._beside, overrides, step_size, parameters)
-        ready = [p for p in prepared if p is not None]
-        idle = idle_values.idle_everywhere([p.idle for p in ready])
-        given = [file.values for file in parameters if not file.text] + [overrides or {}]
-        changed = [*self.events_given, *(file.path.name for file in parameters if file.text)]
-        changed += [f"{key} = {value}" for values in given for key, value in values.items()]
+        idle = idle_values.idle_everywhere([p.idle for p in found])
+        changed = self._changes(values, parameters)
         return [
             replace(
-                p,
-                beside=beside,
-                questions=(*self.questions, *p.questions, *idle),
-                changed=few(changed, _NAMED),
+                p, beside=beside, questions=(*self.questions, *p.questions, *idle), changed=changed
             )
-            for p in ready
+            for p in found
         ]
+
+    def _check_choice(self, scenarios: Sequence[str]) -> None:
+        """Refuse scenarios that the case does not have, or that are chosen twice."""
+        problems = []
+        has = f"the case has: {', '.join(self.scenarios)}"
+        for name in scenarios:
+            if name not in self.scenarios:
+                problems.append(Problem(Option.SCENARIO, f"there is no scenario {name!r}; {has}"))
+        for name, count in Counter(scenarios).items():
+            if count > 1:
+                text = f"the scenario {name!r} is chosen more than once; name it once"
+                problems.append(Problem(Option.SCENARIO, text))
+        if problems:
+            raise CaseError(self.source, [*self.problems, *problems])
+
+    def _look_before_outage(
+        self,
+        draft: Draft,
+        overrides: Mapping[str, Value],
+        parameters: Sequence[ParameterFile],
+        *,
+        shares: bool,
+        follows: bool,
+    ) -> Collection[str]:
+        """Tell a draft the voltages and powers before values take something out of service; gives the units lost.
+
+        ``shares``: whether others are to share the power of these units; not where values say who feeds what.
+        ``follows``: whether loads are to follow the voltage."""
+        follows = follows and draft.reacts
+        shares = shares and not any(key.endswith(".P_0") for key in overrides)
+        if not (follows or shares):
+            return ()
+        before = self._before_outage(draft.given.name, overrides, parameters)
+        if before is None:
+            return ()
+        if follows and before.power_flow is not None:
+            draft.voltages_before = before.power_flow.voltages
+            draft.loads_as_given = self._loads_as_given(before, overrides)
+        if not shares:
+            return ()
+        lost, draft.dispatch = self._switched_off(draft.given.name, before, overrides, parameters)
+        return lost
+
+    def _changes(self, overrides: Mapping[str, Value], parameters: Sequence[ParameterFile]) -> str:
+        """The values and files that the caller gave, in few words."""
+        changes = [*self.events_given, *(file.path.name for file in parameters if file.text)]
+        given = [file.values for file in parameters if not file.text] + [overrides]
+        changes += [f"{key} = {value}" for values in given for key, value in values.items()]
+        return few(changes, _NAMED)
 
     def _switched_on(
         self,
@@ -367,6 +384,18 @@ class Case(CaseDefinition):
         self, name: str, overrides: Mapping[str, Value] | None, parameters: Sequence[ParameterFile]
     ) -> Preparer:
         return prepare.Preparer(self, name, dict(overrides or {}), parameters)
+
+
+def _besides(problems: Sequence[Problem], questions: Sequence[Problem]) -> list[Problem]:
+    """Questions beside problems, one of each kind: unusual data may be the reason of the failure."""
+    kind = problems[0].kind  # a question besides is of no kind of its own
+    by_text: dict[str, Problem] = {}
+    for question in questions:
+        by_text.setdefault(question.text, question)
+    return [
+        Problem(by_text[first].place, f"questioned besides: {line}", kind, besides=True)
+        for first, line in by_kind(by_text).items()
+    ]
 
 
 def _without_outages(overrides: Mapping[str, Value]) -> dict[str, Value]:
