@@ -70,6 +70,10 @@ _RENAMED = {
     "systems.coupling.wires": "systems.coupling.imperfect_wires",
     "output.report.table": "output.report.column_table",
     "output.report.tables": "output.report.terminal_tables",
+    "output.results.recorded": "output.results.recording_reader",
+    "output.results.recording": "output.results.recording_writer",
+    "output.results.storage": "output.results.file_writers",
+    "cases.networks.psse.known_records": "cases.networks.psse.record_catalogue",
 }
 """Modules on the floors that had another name there."""
 

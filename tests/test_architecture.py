@@ -279,8 +279,8 @@ FOR_TYPES = {
     "studies.oscillations.view",
     "output.report.plot_style",
     "output.report.fmu_variables",
-    "output.results.recording",
-    "output.results.storage",
+    "output.results.recording_writer",
+    "output.results.file_writers",
 }
 """Imported by `signal compare`, `gfor verify` and `load`, which start without what computes; `imports` counts these
 arrows."""

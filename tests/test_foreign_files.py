@@ -129,7 +129,7 @@ OWN = {
     "devices.acceptance.worker": "/proc",
     "face.api.saved": "results",
     "cases.form.definition": "is_file before it",
-    "cases.networks.psse.known_records": "our own table",
+    "cases.networks.psse.record_catalogue": "our own table",
     "devices.acceptance.controller_dll.file_head": "is_file before it",
     "devices.fmi.dll_worker": "the library that this process is started for",
     "cases.networks.psse.missing_models": "our own table",

@@ -28,6 +28,10 @@ FORMER = {
     "orchestrator.output.report.table": "orchestrator.output.report.column_table",
     "orchestrator.coupling.wires": "orchestrator.systems.coupling.imperfect_wires",
     "orchestrator.report.table": "orchestrator.output.report.column_table",
+    "orchestrator.output.results.recorded": "orchestrator.output.results.recording_reader",
+    "orchestrator.output.results.recording": "orchestrator.output.results.recording_writer",
+    "orchestrator.results.storage": "orchestrator.output.results.file_writers",
+    "orchestrator.cases.psse.known_records": "orchestrator.cases.networks.psse.record_catalogue",
 }
 
 

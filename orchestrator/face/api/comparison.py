@@ -11,7 +11,7 @@ from orchestrator.core.errors import InputError, few
 from orchestrator.core.threads import side_by_side
 from orchestrator.face.api.given_recording import Recorded, open_given
 from orchestrator.output.results.manifest import ResultsWarning
-from orchestrator.output.results.recorded import in_memory
+from orchestrator.output.results.recording_reader import in_memory
 from orchestrator.studies.signals.common_times import common_times
 from orchestrator.studies.signals.comparison import compare as compare_signal
 from orchestrator.studies.signals.comparison import most_different

@@ -13,7 +13,7 @@ from orchestrator.cases.form.given import users_level
 from orchestrator.core.errors import InputError
 from orchestrator.core.units import to_unit
 from orchestrator.face.api.results import Run
-from orchestrator.output.results.recorded import warn_of_early_end
+from orchestrator.output.results.recording_reader import warn_of_early_end
 from orchestrator.output.results.trajectory import open_trajectory
 from orchestrator.studies.signals.signal_modes import RARE
 

@@ -397,8 +397,8 @@ class Run(NoTruth):
         """Write what ``gfor run`` leaves of this scenario in its folder, for `compare`, ``gfor report`` and others.
 
         Other scenarios' results that are in the folder stay, but for the tables of all together."""
-        from orchestrator.output.results.recording import TRAJECTORY  # noqa: PLC0415 - as below
-        from orchestrator.output.results.storage import save_netcdf  # noqa: PLC0415 - as below
+        from orchestrator.output.results.file_writers import save_netcdf  # noqa: PLC0415 - as below
+        from orchestrator.output.results.recording_writer import TRAJECTORY  # noqa: PLC0415 - as below
         from orchestrator.studies.modes import beside  # noqa: PLC0415 - as below
         from orchestrator.studies.runs.files import save_run, save_study  # noqa: PLC0415 - plots: a second to import
 

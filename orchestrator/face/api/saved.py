@@ -14,7 +14,7 @@ from orchestrator.output.report.html.chapters.chapter import Chapter
 from orchestrator.output.report.html.chapters.folders import chapters_in
 from orchestrator.output.report.notebook import headline, page
 from orchestrator.output.results.manifest import MANIFEST, checked
-from orchestrator.output.results.recorded import open_whole
+from orchestrator.output.results.recording_reader import open_whole
 
 
 class NoSuchFileError(InputError, KeyError):

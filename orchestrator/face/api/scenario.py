@@ -34,8 +34,8 @@ from orchestrator.face.api.results import Modes, Run
 from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ
 from orchestrator.output.report.notebook import page
 from orchestrator.output.results.lock import hold_folder
-from orchestrator.output.results.recorded import IN_MEMORY
-from orchestrator.output.results.recording import recorded_size, temporary_recording
+from orchestrator.output.results.recording_reader import IN_MEMORY
+from orchestrator.output.results.recording_writer import recorded_size, temporary_recording
 from orchestrator.studies.modes.modes import ModesResult, compute_modes, running
 from orchestrator.studies.modes.modes import modes_of as modes_at_point
 from orchestrator.studies.modes.request import ModesRequest, Preparing, StepsRequest

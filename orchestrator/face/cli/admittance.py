@@ -17,7 +17,7 @@ from orchestrator.face.cli.case_arguments import add_excitation_arguments, excit
 from orchestrator.face.cli.terminal import make_console, print_json, said_stages
 from orchestrator.linear.spectra.modes import damping_percent
 from orchestrator.output.report.terminal_tables import make_table
-from orchestrator.output.results.storage import save_table
+from orchestrator.output.results.file_writers import save_table
 from orchestrator.studies.immittance.forms import FORMS, rows_in
 from orchestrator.studies.immittance.measured import as_scan
 from orchestrator.studies.immittance.scan import Scan

@@ -11,8 +11,8 @@ from orchestrator.core.asked import Value
 from orchestrator.core.errors import CosimError, InputError
 from orchestrator.face.cli.terminal import make_console, print_json, print_parts
 from orchestrator.output.report.terminal_tables import make_table
+from orchestrator.output.results.file_writers import save_table
 from orchestrator.output.results.staging import check_free, new_run_id, staged
-from orchestrator.output.results.storage import save_table
 from orchestrator.studies.operating_points.points_file import folder_of, settings_in
 
 TABLE = "points.csv"

@@ -13,7 +13,7 @@ from orchestrator.core.safe_files import PARTIAL, write_text
 from orchestrator.face.cli.run_request import asked_by, how_it_goes_on, keep_request
 from orchestrator.face.cli.terminal import make_errors, warn
 from orchestrator.output.results.checkpoint_file import CHECKPOINT, CHECKPOINTS, PREVIOUS
-from orchestrator.output.results.recording import TRAJECTORY, RecordingFolder
+from orchestrator.output.results.recording_writer import TRAJECTORY, RecordingFolder
 from orchestrator.output.results.staging import ScenarioFolder, remove_at_once, unfinished
 from orchestrator.studies.runs.checkpoints import CASE, Checkpoints, not_kept
 

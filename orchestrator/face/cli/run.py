@@ -34,10 +34,16 @@ from orchestrator.face.cli.run_tables import print_run
 from orchestrator.face.cli.side_by_side import Outcome, Report, SideBySide, number_of_workers
 from orchestrator.face.cli.verdict import add_details_argument, add_verdict_argument, exit_code
 from orchestrator.output.report.progress import progress_bar
+from orchestrator.output.results.file_writers import save_dataset
 from orchestrator.output.results.lock import hold_folder
 from orchestrator.output.results.manifest import read_manifest
-from orchestrator.output.results.recorded import open_whole
-from orchestrator.output.results.recording import FOLDER, TRAJECTORY, RecordingFolder, require_room
+from orchestrator.output.results.recording_reader import open_whole
+from orchestrator.output.results.recording_writer import (
+    FOLDER,
+    TRAJECTORY,
+    RecordingFolder,
+    require_room,
+)
 from orchestrator.output.results.staging import (
     ScenarioFolder,
     check_free,
@@ -47,7 +53,6 @@ from orchestrator.output.results.staging import (
     staged,
     unfinished,
 )
-from orchestrator.output.results.storage import save_dataset
 from orchestrator.simulation.engine import Federates
 from orchestrator.simulation.interop.rules import MASTERS, MasterRules, master_rules
 from orchestrator.studies.modes import beside

@@ -22,9 +22,9 @@ from orchestrator.face.cli.later import say_last
 from orchestrator.output.report.column_table import ColumnTable, ShownTable
 from orchestrator.output.report.linearised import exceptions_in_words
 from orchestrator.output.report.terminal_tables import PlainTable
+from orchestrator.output.results.file_writers import save_json
 from orchestrator.output.results.manifest import ResultsWarning
 from orchestrator.output.results.staging import new_run_id, staged
-from orchestrator.output.results.storage import save_json
 
 if TYPE_CHECKING:
     from orchestrator.cases.networks.element_names import ElementNames

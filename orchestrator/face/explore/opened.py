@@ -14,7 +14,7 @@ from orchestrator.output.report.explorer_cells import CELLS, check_case, found_f
 from orchestrator.output.report.html.charts import ChartCurve, thinned
 from orchestrator.output.report.html.folder import SUMMARY
 from orchestrator.output.results.readers import has_reader
-from orchestrator.output.results.recording import TRAJECTORY
+from orchestrator.output.results.recording_writer import TRAJECTORY
 from orchestrator.studies.certification.case_file import CASE
 from orchestrator.studies.certification.certificate import Certificate, DampingCertificate
 from orchestrator.studies.certification.codes.bench_point import case_name

@@ -15,7 +15,7 @@ from orchestrator.core.late import pd
 from orchestrator.output.report.colours import OF_MARKS
 from orchestrator.output.report.html.elements import table as table_of_page
 from orchestrator.output.report.terminal_tables import PlainTable, make_table
-from orchestrator.output.results.storage import save_table
+from orchestrator.output.results.file_writers import save_table
 
 Row = TypeVar("Row")
 

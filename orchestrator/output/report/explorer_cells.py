@@ -16,7 +16,7 @@ from orchestrator.cases.form.definition import CaseDefinition
 from orchestrator.cases.form.parameter_files import ParameterFile
 from orchestrator.cases.form.schema import Value
 from orchestrator.core.errors import InputError
-from orchestrator.output.results.storage import save_json
+from orchestrator.output.results.file_writers import save_json
 
 CELLS = "cells.json"
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from orchestrator.core.errors import InputError
 from orchestrator.output.results import origin
-from orchestrator.output.results.storage import save_json, versions_of
+from orchestrator.output.results.file_writers import save_json, versions_of
 
 MANIFEST = "manifest.json"
 _FORMAT = 1

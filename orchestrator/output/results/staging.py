@@ -19,7 +19,7 @@ from orchestrator.output.results.manifest import (
     sha256_of,
     write_manifest,
 )
-from orchestrator.output.results.recording import ENDED_EARLY
+from orchestrator.output.results.recording_writer import ENDED_EARLY
 
 _OLD = ".old-"
 _DONE_WITH = ".done-with"

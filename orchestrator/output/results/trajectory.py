@@ -10,8 +10,8 @@ from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import PARTIAL
 from orchestrator.output.results.manifest import MANIFEST, ResultsWarning, checked
 from orchestrator.output.results.readers import reader_of
-from orchestrator.output.results.recorded import open_recording, open_whole
-from orchestrator.output.results.recording import FOLDER, TRAJECTORY, parts_of
+from orchestrator.output.results.recording_reader import open_recording, open_whole
+from orchestrator.output.results.recording_writer import FOLDER, TRAJECTORY, parts_of
 from orchestrator.output.results.staging import unfinished
 
 if TYPE_CHECKING:

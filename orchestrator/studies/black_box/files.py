@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from orchestrator.linear.models.linear_model import IDENTIFIED
 from orchestrator.output.report.colours import colour
 from orchestrator.output.report.plot_style import STYLE, save_figure
-from orchestrator.output.results.storage import save_json, save_matrices, save_table
+from orchestrator.output.results.file_writers import save_json, save_matrices, save_table
 from orchestrator.studies.black_box.fitting import IdentifiedModel, Passivity
 from orchestrator.studies.black_box.frequency_response import FrequencyResponse
 

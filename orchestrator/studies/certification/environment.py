@@ -6,7 +6,7 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
-from orchestrator.output.results.storage import versions_of
+from orchestrator.output.results.file_writers import versions_of
 from orchestrator.studies.points.code import code_hash
 
 CODE = "Code"  # entry with the hash of this program's code

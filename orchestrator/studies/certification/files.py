@@ -14,8 +14,8 @@ from orchestrator.core.foreign_files import read_text
 from orchestrator.core.options import Option
 from orchestrator.core.safe_files import file_hash, write_text
 from orchestrator.output.report.pdf import print_pdf
+from orchestrator.output.results.file_writers import save_netcdf
 from orchestrator.output.results.staging import check_free
-from orchestrator.output.results.storage import save_netcdf
 from orchestrator.output.signatures.beside import Beside
 from orchestrator.studies.certification.acceptance import KEPT
 from orchestrator.studies.certification.case_file import BINDING, CASE, FMU

@@ -13,7 +13,7 @@ from orchestrator.core.errors import InputError, number_of
 from orchestrator.core.safe_files import write_text
 from orchestrator.devices.fmi.values import as_text
 from orchestrator.output.report.html.elements import document, table
-from orchestrator.output.results.storage import save_json
+from orchestrator.output.results.file_writers import save_json
 from orchestrator.studies.certification.certificate import Certificate
 from orchestrator.studies.certification.codes.needs_record import NEEDS_HTML, NEEDS_JSON
 from orchestrator.studies.certification.codes.perturbation_plot import FIGURES_JSON, FIGURES_PNG

@@ -14,8 +14,8 @@ from orchestrator.core.truth import NoTruth
 from orchestrator.output.report.column_table import Column, ColumnTable
 from orchestrator.output.report.notebook import page
 from orchestrator.output.report.terminal_tables import PlainTable, make_table
+from orchestrator.output.results.file_writers import save_json
 from orchestrator.output.results.manifest import made_now
-from orchestrator.output.results.storage import save_json
 from orchestrator.studies.coordinated_design.search import RankedConverter
 from orchestrator.studies.coordinated_design.settings import PodGroup
 from orchestrator.studies.coordinated_design.study import PointsDesign, values_of

@@ -15,7 +15,7 @@ from orchestrator.core.truth import NoTruth
 from orchestrator.output.report.notebook import page
 from orchestrator.output.report.terminal_tables import make_table
 from orchestrator.output.report.verdict_sentence import VerdictSentence
-from orchestrator.output.results.storage import save_json
+from orchestrator.output.results.file_writers import save_json
 from orchestrator.studies.immittance.margins import Margin
 from orchestrator.studies.immittance.retune import Retuned, Study, Tunable, retune
 from orchestrator.studies.immittance.sides import short_name

@@ -16,9 +16,9 @@ from orchestrator.output.report.html.elements import Figures, document, paragrap
 from orchestrator.output.report.mode_tables import mode_columns, verdict
 from orchestrator.output.report.notebook import page
 from orchestrator.output.report.short_texts import first_few
+from orchestrator.output.results.file_writers import save_json, save_table
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.output.results.staging import new_run_id, staged
-from orchestrator.output.results.storage import save_json, save_table
 from orchestrator.studies.interactions.following import Follow, FollowedMode
 from orchestrator.studies.interactions.judgement import (
     JudgedInteractions,

@@ -14,7 +14,12 @@ from orchestrator.linear.models.perturbation import PERTURBATIONS
 from orchestrator.linear.models.state_space import StateSpace
 from orchestrator.linear.models.steady_state import OperatingPoint, find_operating_point
 from orchestrator.linear.spectra.stability import Stability
-from orchestrator.output.results.storage import provenance, save_json, save_matrices, save_table
+from orchestrator.output.results.file_writers import (
+    provenance,
+    save_json,
+    save_matrices,
+    save_table,
+)
 from orchestrator.studies.modes.modes import running
 from orchestrator.systems.coupling.step_awareness import STEP_PARAMETER, knows_step
 

@@ -15,7 +15,7 @@ from orchestrator.core.safe_files import file_hash
 from orchestrator.linear.models.blocks import Blocks
 from orchestrator.linear.models.linearization import continuous
 from orchestrator.linear.models.steady_state import find_operating_point
-from orchestrator.output.results.storage import measuring_places
+from orchestrator.output.results.file_writers import measuring_places
 from orchestrator.studies.modes.modes import running
 from orchestrator.studies.oscillations.models import Response, UnitModel, UnitModels, turn
 

@@ -17,8 +17,8 @@ from orchestrator.core.spelling import spelled
 from orchestrator.core.truth import NoTruth
 from orchestrator.linear.spectra.modes import Mode, damping_percent, damping_ratio
 from orchestrator.output.report.notebook import page
+from orchestrator.output.results.file_writers import save_json
 from orchestrator.output.results.manifest import made_now
-from orchestrator.output.results.storage import save_json
 from orchestrator.studies.pod_design.closed_loop import Placed
 from orchestrator.studies.pod_design.design import PodDesign
 from orchestrator.studies.pod_design.lead_lag import LeadLag, angle_deg

@@ -15,7 +15,7 @@ from orchestrator.core.options import Option
 from orchestrator.core.safe_files import write_text
 from orchestrator.output.results import checkpoint_file
 from orchestrator.output.results.netcdf import DAMAGED, stored_name
-from orchestrator.output.results.recording import (
+from orchestrator.output.results.recording_writer import (
     FOLDER,
     TRAJECTORY,
     RecordingFolder,

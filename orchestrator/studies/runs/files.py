@@ -14,11 +14,11 @@ from orchestrator.core.errors import RunInterruptedError
 from orchestrator.core.safe_files import write_bytes
 from orchestrator.output.report.explorer_cells import word_of
 from orchestrator.output.report.power_flow import COLUMNS
-from orchestrator.output.results.recorded import in_memory, open_whole
-from orchestrator.output.results.recording import TRAJECTORY
+from orchestrator.output.results.file_writers import save_csv, save_json, save_netcdf, save_table
+from orchestrator.output.results.recording_reader import in_memory, open_whole
+from orchestrator.output.results.recording_writer import TRAJECTORY
 from orchestrator.output.results.signals import relative_difference
 from orchestrator.output.results.staging import ScenarioFolder, new_run_id, staged
-from orchestrator.output.results.storage import save_csv, save_json, save_netcdf, save_table
 from orchestrator.studies.modes.modes import ModesResult, modes_json, named_json, scenario_json
 from orchestrator.studies.modes.tables import head_of, modes_table
 from orchestrator.studies.runs.answer import EarlyEnd

@@ -12,7 +12,7 @@ from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.scenario.protection_relays import require_no_relays
 from orchestrator.core.errors import InputError
 from orchestrator.core.late import xr
-from orchestrator.output.results.storage import trajectory_dataset
+from orchestrator.output.results.file_writers import trajectory_dataset
 from orchestrator.simulation.interop.rules import MasterRules
 from orchestrator.systems.coupling.clock import Clock
 from orchestrator.systems.coupling.events import Event, faults_among

@@ -32,9 +32,9 @@ from orchestrator.linear.models.state_access import obstacle
 from orchestrator.linear.signals.identification import IdentifiedMode
 from orchestrator.linear.spectra.critical_modes import nearest_eigenvalue
 from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ
-from orchestrator.output.results.recorded import open_whole
-from orchestrator.output.results.recording import ENDED_EARLY, TRAJECTORY, RecordingFolder
-from orchestrator.output.results.storage import trajectory_dataset
+from orchestrator.output.results.file_writers import trajectory_dataset
+from orchestrator.output.results.recording_reader import open_whole
+from orchestrator.output.results.recording_writer import ENDED_EARLY, TRAJECTORY, RecordingFolder
 from orchestrator.simulation.engine import ENGINES, Engine, Federates
 from orchestrator.simulation.watch.finding import NOT_JUDGED, UNSTABLE, Finding
 from orchestrator.simulation.watch.relay_trips import relays_in

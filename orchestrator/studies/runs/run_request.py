@@ -9,7 +9,7 @@ from orchestrator.cases.form.given import Time, in_seconds
 from orchestrator.core.asked import FLAG, FieldKind, asked, read_whole, whole_number
 from orchestrator.core.cores import MOST_THREADS
 from orchestrator.core.errors import InputError
-from orchestrator.output.results.recording import RecordingFolder
+from orchestrator.output.results.recording_writer import RecordingFolder
 from orchestrator.simulation.engine import Federates
 from orchestrator.studies.points.request import ANYTHING
 from orchestrator.studies.runs.checkpoints import EVERY, Checkpoints

@@ -31,9 +31,9 @@ from orchestrator.output.report.html.elements import SHADES, Figures, document
 from orchestrator.output.report.mode_tables import damping, eigenvalue_text
 from orchestrator.output.report.notebook import page
 from orchestrator.output.report.short_texts import kinds_of
+from orchestrator.output.results.file_writers import save_json
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.output.results.staging import new_run_id, staged
-from orchestrator.output.results.storage import save_json
 from orchestrator.studies.operating_points.item import Status
 from orchestrator.studies.operating_points.line_ends import line_of
 from orchestrator.studies.screening.limits import (

@@ -9,9 +9,9 @@ from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder
 from orchestrator.output.report.column_table import Column, ColumnTable
 from orchestrator.output.report.notebook import page
+from orchestrator.output.results.file_writers import save_json, save_table
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.output.results.staging import new_run_id, staged
-from orchestrator.output.results.storage import save_json, save_table
 from orchestrator.studies.sensitivities.sensitivities import Sensitivity, SensitivityResult
 
 

@@ -14,8 +14,8 @@ from orchestrator.linear.signals.ambient import AmbientMode
 from orchestrator.output.report.colours import colour
 from orchestrator.output.report.html.elements import damping, document, table
 from orchestrator.output.report.notebook import page
+from orchestrator.output.results.file_writers import save_json, save_table
 from orchestrator.output.results.staging import new_run_id, staged
-from orchestrator.output.results.storage import save_json, save_table
 
 Alarm = Literal["below", "perhaps below", "forced", ""]
 

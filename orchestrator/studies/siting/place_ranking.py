@@ -13,9 +13,9 @@ from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder, write_text
 from orchestrator.output.report.column_table import ShownTable
 from orchestrator.output.report.notebook import page
+from orchestrator.output.results.file_writers import save_json, save_table
 from orchestrator.output.results.lock import hold_folder
 from orchestrator.output.results.staging import new_run_id, staged
-from orchestrator.output.results.storage import save_json, save_table
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.siting.confirmation import Confirmation
 

@@ -15,8 +15,8 @@ import numpy as np
 from orchestrator.core.late import xr
 from orchestrator.linear.spectra.modes import damping_percent
 from orchestrator.output.report.short_texts import kinds_of
+from orchestrator.output.results.file_writers import provenance, save_netcdf, save_table
 from orchestrator.output.results.mode_json import eigenvalue_json
-from orchestrator.output.results.storage import provenance, save_netcdf, save_table
 from orchestrator.studies.sweep.axes import grid_places
 from orchestrator.studies.sweep.point import PointRecord
 from orchestrator.studies.sweep.sweep import ScenarioSweep, SweepResult

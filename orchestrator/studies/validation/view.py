@@ -18,8 +18,8 @@ from orchestrator.output.report.notebook import page
 from orchestrator.output.report.pdf import print_pdf
 from orchestrator.output.report.terminal_tables import PlainTable, make_table
 from orchestrator.output.report.verdict_sentence import VerdictSentence
+from orchestrator.output.results.file_writers import save_json, save_table
 from orchestrator.output.results.staging import new_run_id, staged
-from orchestrator.output.results.storage import save_json, save_table
 from orchestrator.studies.validation.event import EventComparison
 from orchestrator.studies.validation.fit import Fit
 from orchestrator.studies.validation.limits import Criterion, LimitVerdict

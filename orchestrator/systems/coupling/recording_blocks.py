@@ -1,5 +1,5 @@
 """Blocks of recorded rows: how many rows wait in memory, for how long, and what takes them then: memory, or a sink such
-as a folder on the disk (`orchestrator.output.results.recording`)."""
+as a folder on the disk (`orchestrator.output.results.recording_writer`)."""
 
 from collections.abc import Iterator, Sequence
 from typing import Protocol

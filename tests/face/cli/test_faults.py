@@ -19,7 +19,7 @@ import xarray as xr
 
 from orchestrator.cases.case import load_case
 from orchestrator.face.cli import run as command
-from orchestrator.output.results import recording
+from orchestrator.output.results import recording_writer
 from orchestrator.output.results.manifest import read_manifest
 from orchestrator.systems.coupling.observers import Progress
 
@@ -80,7 +80,7 @@ def test_a_recording_that_the_disk_cannot_hold_is_refused_before_the_start(
     gfor, monkeypatch, tmp_path
 ):
     monkeypatch.setattr(
-        recording.shutil, "disk_usage", lambda folder: SimpleNamespace(free=100_000)
+        recording_writer.shutil, "disk_usage", lambda folder: SimpleNamespace(free=100_000)
     )
     code, _, error = gfor(*RUN, "--out", tmp_path)
     assert code == 2

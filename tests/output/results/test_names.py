@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from orchestrator.output.results.file_writers import save_dataset, save_netcdf
 from orchestrator.output.results.netcdf import join_netcdf, name_of, netcdf_image, stored_name
-from orchestrator.output.results.recorded import open_recording, open_whole
-from orchestrator.output.results.storage import save_dataset, save_netcdf
+from orchestrator.output.results.recording_reader import open_recording, open_whole
 
 NAMES = ("unit.bus/1/v", "unit.share%", "unit.a%2Fb", "unit.plain")
 TIMES = np.arange(4) * 0.1

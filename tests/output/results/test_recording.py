@@ -15,11 +15,11 @@ import pytest
 import xarray as xr
 
 from orchestrator.core.errors import InputError, ResultsError
-from orchestrator.output.results import recorded, storage
-from orchestrator.output.results.recorded import open_recording, open_whole
-from orchestrator.output.results.recording import RecordingFolder, parts_of
+from orchestrator.output.results import file_writers, recording_reader
+from orchestrator.output.results.file_writers import save_csv, trajectory_dataset
+from orchestrator.output.results.recording_reader import open_recording, open_whole
+from orchestrator.output.results.recording_writer import RecordingFolder, parts_of
 from orchestrator.output.results.signals import signal as signal_of
-from orchestrator.output.results.storage import save_csv, trajectory_dataset
 from tests.support.scenarios import bare_scenario, prepare_one
 
 NAMES = ("gfor.p", "gfor.omega", "grid.v")
@@ -90,10 +90,10 @@ def test_of_a_long_recording_only_the_rows_that_are_asked_for_are_read(
     recording.join(tmp_path / "elsewhere" / "trajectory.nc")
     (tmp_path / "recording").mkdir()
     keep(RecordingFolder(tmp_path / "recording", prepared), rows, 100)
-    monkeypatch.setattr(recorded, "IN_MEMORY", 1000)
+    monkeypatch.setattr(recording_reader, "IN_MEMORY", 1000)
     monkeypatch.setattr(xr, "open_dataset", None)
     whole = open_whole(tmp_path / "elsewhere" / "trajectory.nc")
-    assert not recorded.in_memory(whole)
+    assert not recording_reader.in_memory(whole)
     keys = (
         0,
         -1,
@@ -224,7 +224,7 @@ import sys
 from pathlib import Path
 sys.path.insert(0, {root!r})
 from orchestrator.cases.case import load_case
-from orchestrator.output.results.recording import RecordingFolder
+from orchestrator.output.results.recording_writer import RecordingFolder
 from tests.output.results.test_recording import Rows, keep
 (prepared,) = load_case("infinite_bus").prepare(["dip"])
 recording = RecordingFolder(Path(sys.argv[1]), prepared)
@@ -281,7 +281,7 @@ def test_the_attributes_say_of_which_run_a_part_is(tmp_path, prepared):
 
 
 def test_a_recording_says_how_far_its_rows_are_apart(monkeypatch):
-    monkeypatch.setattr(storage, "provenance", lambda prepared: {})
-    monkeypatch.setattr(storage, "measuring_places", lambda prepared: {})
+    monkeypatch.setattr(file_writers, "provenance", lambda prepared: {})
+    monkeypatch.setattr(file_writers, "measuring_places", lambda prepared: {})
     prepared = bare_scenario(record_filtered=True, record_every=40, step_size=1e-4)
-    assert storage.origin_of_rows(prepared)["record_interval_s"] == pytest.approx(4e-3)
+    assert file_writers.origin_of_rows(prepared)["record_interval_s"] == pytest.approx(4e-3)

@@ -19,7 +19,6 @@ from orchestrator.cases.networks.psse.limiter_records import place_limiters
 from orchestrator.cases.networks.psse.machine_model import (
     BY_SPEED,
     CLASSICAL,
-    KNOWN_RECORDS,
     OF_PLANTS,
     SOURCE_IMPEDANCE,
     MachineModel,
@@ -36,6 +35,7 @@ from orchestrator.cases.networks.psse.parts_of_machines import MachineKey, Parts
 from orchestrator.cases.networks.psse.plant_points import measured_points
 from orchestrator.cases.networks.psse.raw_network import Machine
 from orchestrator.cases.networks.psse.record_doubts import doubts_of_machine
+from orchestrator.cases.networks.psse.records_of_units import RECORDS_OF_UNITS
 from orchestrator.core.errors import InputError, first_of
 from orchestrator.core.options import Option
 
@@ -98,10 +98,10 @@ def _refuse_what_lacks(
     strange = [
         record
         for record in records
-        if (record.bus, record.machine) not in there and record.name in KNOWN_RECORDS
+        if (record.bus, record.machine) not in there and record.name in RECORDS_OF_UNITS
     ]
     unmodelled = without_machine(found.parts)
-    passed = {*KNOWN_RECORDS, *found.without, *(left - _own_models(records, left, unmodelled))}
+    passed = {*RECORDS_OF_UNITS, *found.without, *(left - _own_models(records, left, unmodelled))}
     passed |= {*(FIELDS if found.approximate else ())}
     missing = missing_models(records, found.machines, passed, unmodelled)
     lacking = {key for model in missing for key in _machines_of(model) if not model.may_go}
@@ -157,7 +157,7 @@ def _own_models(
 
     ``bare``: machines without a record of one."""
     found = set()
-    for name in (name for name in names if name not in KNOWN_RECORDS):
+    for name in (name for name in names if name not in RECORDS_OF_UNITS):
         own = [record for record in records if record.name == name]
         if own and is_own(name, own, bare):
             found.add(name)

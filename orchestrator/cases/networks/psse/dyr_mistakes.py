@@ -9,10 +9,10 @@ from orchestrator.cases.form.remedies import APPROXIMATING, replacement_of, with
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.machine_model import (
     KINDS_OF_CONVERTERS,
-    KNOWN_RECORDS,
     OF_PLANTS,
     ON_SHAFT,
 )
+from orchestrator.cases.networks.psse.records_of_units import RECORDS_OF_UNITS
 from orchestrator.core.errors import few
 
 OF_NO_ORDER = dict.fromkeys(("REGFM_C1", "REGFMC1", "REGFMC1U"), "regfm_c1_phasor")
@@ -99,7 +99,7 @@ def other_network(
     def names_of(keys: Iterable[tuple[int, str]]) -> str:
         return few((f"{bus} {name!r}" for bus, name in keys), _NAMED)
 
-    known = sum(record.name in KNOWN_RECORDS for record in records)
+    known = sum(record.name in RECORDS_OF_UNITS for record in records)
     return (
         f"{strange[0].file} and the RAW file do not belong together, as it seems: {len(strange)} of {known} records of "
         f"machines stand at buses or identifiers that the RAW file has no generator at ({names_of(places)}; first "
@@ -112,7 +112,9 @@ def other_network(
 def slips(strange: Sequence[DynamicRecord]) -> Iterator[str]:
     """Yield one problem with the machines that the RAW file lacks, where another machine has no record: a slip."""
     own = [
-        record for record in strange if KNOWN_RECORDS[record.name].kind in ("machine", "converter")
+        record
+        for record in strange
+        if RECORDS_OF_UNITS[record.name].kind in ("machine", "converter")
     ]
     if own:
         named = (

@@ -14,12 +14,12 @@ from orchestrator.cases.networks.psse.limiter_records import LIMITERS
 from orchestrator.cases.networks.psse.machine_model import (
     CLASSICAL,
     COMPENSATION,
-    COMPENSATORS,
     MANUAL,
     WITHOUT_INERTIA,
 )
 from orchestrator.cases.networks.psse.plant_points import HELD_BUS
 from orchestrator.cases.networks.psse.raw_network import Machine, unit_labels
+from orchestrator.cases.networks.psse.records_of_units import COMPENSATORS
 from orchestrator.cases.networks.unit_row import DoubtOfRecord, UnitRow, checked
 from orchestrator.core.errors import InputError
 

@@ -1,27 +1,13 @@
-"""The model of a generator by its records of dynamics data, and the records that have a part of ours."""
+"""The model of a generator by its records of dynamics data: the parts that it is made of."""
 
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from fmus.distributed_generation.dyr_records import DISTRIBUTED_RECORDS
-from fmus.induction_machine.dyr_records import INDUCTION_RECORDS
-from fmus.regfm_a1.dyr_records import REGFM_A1_RECORDS
-from fmus.regfm_b1.dyr_records import REGFM_B1_RECORDS
-from fmus.static_var.dyr_records import STATIC_VAR_RECORDS
-from fmus.synchronous_generator.dyr_records import DYR_RECORDS
-from fmus.wecc_renewable.dyr_records import AT_A_UNIT, ELSEWHERE, PLANT_MODEL, PLANT_RECORDS
+from fmus.wecc_renewable.dyr_records import AT_A_UNIT, ELSEWHERE, PLANT_MODEL
 from orchestrator.cases.networks.measured_point import MeasuredPoint
 from orchestrator.cases.networks.unit_row import DoubtOfRecord
 
-GRID_FORMING_RECORDS = REGFM_A1_RECORDS | REGFM_B1_RECORDS
-
-OTHER_RECORDS = STATIC_VAR_RECORDS | DISTRIBUTED_RECORDS | INDUCTION_RECORDS
-
-COMPENSATORS = frozenset(record.part for record in STATIC_VAR_RECORDS.values())
-"""Models that feed no active power."""
-
-KNOWN_RECORDS = DYR_RECORDS | GRID_FORMING_RECORDS | PLANT_RECORDS | OTHER_RECORDS
 ON_SHAFT = ("aerodynamics", "pitch", "torque")
 """Kinds of records of a wind turbine that act on its shaft."""
 

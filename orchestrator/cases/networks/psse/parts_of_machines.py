@@ -8,13 +8,13 @@ from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.dyr_mistakes import remedy_for
 from orchestrator.cases.networks.psse.machine_model import (
     CLASSICAL,
-    KNOWN_RECORDS,
     OF_PLANTS,
     WITHOUT_INERTIA,
 )
 from orchestrator.cases.networks.psse.missing_models import kind_of
 from orchestrator.cases.networks.psse.raw_network import Machine, unit_labels
 from orchestrator.cases.networks.psse.record_values import values_of_record
+from orchestrator.cases.networks.psse.records_of_units import RECORDS_OF_UNITS
 from orchestrator.core.errors import InputError
 
 MachineKey = tuple[int, str]
@@ -55,7 +55,7 @@ class PartsOfMachines:
         if record.name in self._left or (self.approximate and record.name in FIELDS):
             return
         is_left = self.approximate and record.name in OF_PLANTS
-        known = None if is_left else KNOWN_RECORDS.get(record.name)
+        known = None if is_left else RECORDS_OF_UNITS.get(record.name)
         if known is None:
             self._note_unknown(record, key)
         elif known.kind in self.parts[key]:

@@ -5,9 +5,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from fmus.grid_following.dyr_approximation import FIELDS
 from fmus.synchronous_generator.dyr_records import DYR_RECORDS
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, given_values
-from orchestrator.cases.networks.psse.machine_model import KNOWN_RECORDS
 from orchestrator.cases.networks.psse.raw_network import Machine
 from orchestrator.cases.networks.psse.record_values import CEILING, FLOOR, chosen_ceiling
+from orchestrator.cases.networks.psse.records_of_units import RECORDS_OF_UNITS
 from orchestrator.cases.networks.unit_row import DoubtOfRecord
 
 _LEAST_SIGNALS = ("uel.V_UIMIN", "uel.V_ULMIN")
@@ -56,10 +56,10 @@ def doubts_of_machine(
 def _omissions(records: Sequence[DynamicRecord]) -> Iterator[DoubtOfRecord]:
     """Return what a part of ours leaves out of its record, by the fields that ask for it."""
     for record in records:
-        known = KNOWN_RECORDS.get(record.name)
+        known = RECORDS_OF_UNITS.get(record.name)
         if known is None or not known.omissions:
             continue
-        given = given_values(record, known.fields, {*KNOWN_RECORDS, *FIELDS})
+        given = given_values(record, known.fields, {*RECORDS_OF_UNITS, *FIELDS})
         for name, text in known.omissions.items():
             if given[name]:
                 said = f"{record.name} has {name} = {given[name]:g}: {text}"
@@ -139,7 +139,7 @@ def _of_oel2c(
         yield DoubtOfRecord(
             "oel.V_OELMAX1", record.place, text, "a limiter that rests above 0 at a sum"
         )
-    given = given_values(record, KNOWN_RECORDS[record.name].fields, {*KNOWN_RECORDS, *FIELDS})
+    given = given_values(record, RECORDS_OF_UNITS[record.name].fields, {*RECORDS_OF_UNITS, *FIELDS})
     if given["IFDRATED"] not in (0, 1):
         text = (
             f"{record.name} has IFDRATED = {given['IFDRATED']:g}, which no public diagram uses: its limits are taken "
@@ -165,7 +165,7 @@ def _turned_limits(
 def _sets(name: str) -> set[str]:
     return {
         p
-        for field in (KNOWN_RECORDS[name].fields if name in KNOWN_RECORDS else ())
+        for field in (RECORDS_OF_UNITS[name].fields if name in RECORDS_OF_UNITS else ())
         for p in field.parameters
     }
 
@@ -174,7 +174,7 @@ def _chosen_limits(records: Sequence[DynamicRecord]) -> Iterator[DoubtOfRecord]:
     """Ask about the limits that PSS/E chooses."""
     for record in (record for record in records if record.name in DYR_RECORDS):
         known = DYR_RECORDS[record.name]
-        given = given_values(record, known.fields, {*KNOWN_RECORDS, *FIELDS})
+        given = given_values(record, known.fields, {*RECORDS_OF_UNITS, *FIELDS})
         ceiling = chosen_ceiling(known, given)
         if ceiling <= 0:
             continue

@@ -10,7 +10,7 @@ from fmus.toolchain.dyr_form import (
 )
 from orchestrator.cases.form.remedies import APPROXIMATING, without_models
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, given_values
-from orchestrator.cases.networks.psse.machine_model import KNOWN_RECORDS
+from orchestrator.cases.networks.psse.records_of_units import RECORDS_OF_UNITS
 from orchestrator.core.errors import InputError
 
 _BUS = "BUSR"
@@ -56,7 +56,7 @@ def chosen_ceiling(known: DyrRecord, given: Mapping[str, float]) -> float:
 
 def _read_numbers(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
     """Return the numbers of a record, with the limits that PSS/E chooses."""
-    given = given_values(record, known.fields, {*KNOWN_RECORDS, *FIELDS})
+    given = given_values(record, known.fields, {*RECORDS_OF_UNITS, *FIELDS})
     ceiling = chosen_ceiling(known, given)
     if ceiling > 0:
         given |= {CEILING: ceiling, FLOOR: -ceiling}

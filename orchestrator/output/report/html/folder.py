@@ -12,8 +12,8 @@ import xarray as xr
 from orchestrator.cases.case import Case, load_case
 from orchestrator.core.errors import InputError
 from orchestrator.output.results.manifest import MANIFEST, check_one_run, checked, read_manifest
-from orchestrator.output.results.recorded import open_whole, warn_of_early_end
-from orchestrator.output.results.recording import TRAJECTORY
+from orchestrator.output.results.recording_reader import open_whole, warn_of_early_end
+from orchestrator.output.results.recording_writer import TRAJECTORY
 
 SUMMARY = "summary.json"  # what a folder of `gfor run` has, and no other
 

@@ -10,7 +10,7 @@ from typing import Any
 from orchestrator.core.safe_files import write_text
 from orchestrator.output.report.column_table import ShownTable
 from orchestrator.output.report.html.elements import document, table
-from orchestrator.output.results.storage import save_json
+from orchestrator.output.results.file_writers import save_json
 from orchestrator.studies.certification.codes.sensitivity import MarginSensitivity
 from orchestrator.studies.certification.codes.what_it_takes import (
     ChangePlan,

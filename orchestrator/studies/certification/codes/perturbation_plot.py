@@ -8,7 +8,7 @@ import numpy as np
 
 from orchestrator.output.report.colours import colour
 from orchestrator.output.report.plot_style import STYLE, save_figure
-from orchestrator.output.results.storage import save_json, save_table
+from orchestrator.output.results.file_writers import save_json, save_table
 from orchestrator.studies.black_box.frequency_response import Excitation
 from orchestrator.studies.certification.codes.frequency.limits import (
     POWER,

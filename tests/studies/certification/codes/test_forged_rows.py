@@ -13,7 +13,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import file_hash
 from orchestrator.devices.binding.binding import bound_fmu
-from orchestrator.output.results.storage import save_netcdf
+from orchestrator.output.results.file_writers import save_netcdf
 from orchestrator.studies.certification.case_file import BINDING
 from orchestrator.studies.certification.certificate import Certificate
 from orchestrator.studies.certification.codes.all_codes import CODES

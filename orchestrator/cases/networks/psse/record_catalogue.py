@@ -1,4 +1,6 @@
-"""The records of dynamics data that gfor reads: what each becomes, where that is known from, what is left."""
+"""The list that `gfor new --list-models` prints: what each record becomes, by which source, and what is left out.
+
+The records themselves, with their fields: `records_of_units`, and beside each model."""
 
 import tomllib
 from collections.abc import Iterator

@@ -1,4 +1,6 @@
-"""Recordings, read from the disk: a run's whole recording, or one that grows."""
+"""Reads the recording of a run of ours from the disk: a whole one, or one that grows.
+
+Whichever file a user names, also a measured one: `trajectory`."""
 
 from __future__ import annotations
 
@@ -11,7 +13,7 @@ from orchestrator.core.errors import InputError
 from orchestrator.core.late import xr
 from orchestrator.output.results.manifest import ResultsWarning
 from orchestrator.output.results.netcdf import DAMAGED, Piece, name_of, opened, stored_name
-from orchestrator.output.results.recording import ENDED_EARLY, parts_of
+from orchestrator.output.results.recording_writer import ENDED_EARLY, parts_of
 
 IN_MEMORY = 256_000_000  # size of a recording up to which it is read as a whole [bytes]
 _SHOWN = ("units", "long_name")

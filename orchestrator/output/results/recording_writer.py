@@ -1,4 +1,4 @@
-"""A recording on the disk while it grows: a folder of small files, each of them whole, that are joined at the end."""
+"""Writes the recording of a run while it grows: a folder of small files, each of them whole, joined at the end."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from orchestrator.core.errors import InputError, ResultsError
 from orchestrator.core.options import Option
 from orchestrator.core.safe_files import flush, not_written, write_bytes
+from orchestrator.output.results.file_writers import column_attributes, origin_of_rows
 from orchestrator.output.results.netcdf import (
     DAMAGED,
     Attributes,
@@ -24,7 +25,6 @@ from orchestrator.output.results.netcdf import (
     opened,
     stored_name,
 )
-from orchestrator.output.results.storage import column_attributes, origin_of_rows
 from orchestrator.systems.coupling.recording_blocks import Block
 
 if TYPE_CHECKING:

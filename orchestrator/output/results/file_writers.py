@@ -1,4 +1,6 @@
-"""Results on disk: NetCDF with units, long names and provenance, and CSV beside it."""
+"""Writes the files of finished results: NetCDF with units, long names and provenance; CSV, JSON, MATLAB.
+
+The rows of a run that is under way: `recording_writer`."""
 
 from __future__ import annotations
 
