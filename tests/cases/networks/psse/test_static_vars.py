@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from orchestrator.cases.case import load_case
@@ -151,6 +152,31 @@ def test_a_compensator_holds_the_bus_that_its_record_names(gfor, tmp_path, name)
     assert v_7 != pytest.approx(1.02, abs=1e-3)
     ends = {(str(x.source), str(x.target)) for x in prepared.system.connections}
     assert ("grid.bus_7.v", "gfor8.held.v") in ends
+
+
+def modes_of(gfor, files, folder):
+    code, _, err = gfor("new", *files, "--out", folder / "case.toml", "--json", "--force")
+    assert code == 0, err
+    code, out, err = gfor("modes", folder / "case.toml", "--scenario", "base", "--json")
+    assert code == 0, err
+    (scenario,) = json.loads(out)["scenarios"]
+    return [(mode["real"], mode["imag"]) for mode in scenario["modes"]]
+
+
+def test_a_bus_close_by_is_held_as_its_own_and_one_far_away_is_not(gfor, tmp_path):
+    """Of a line from 8 to 7 nearly nothing is left: both models have the same modes, and not so with the line."""
+    found = {}
+    for is_close in (True, False):
+        for bus in (8, 7):
+            files = with_compensator(tmp_path, "CSVGN5", bus=bus)
+            line = "7,8,'1 ',0.0085,0.072,0.149,"
+            text = files[0].read_text()
+            assert line in text
+            if is_close:
+                files[0].write_text(text.replace(line, "7,8,'1 ',0.0,0.0004,0.0,"))
+            found[is_close, bus] = np.array(modes_of(gfor, files, tmp_path))
+    assert found[True, 7] == pytest.approx(found[True, 8], abs=2e-3)
+    assert abs(found[False, 7] - found[False, 8]).max() > 0.01
 
 
 @pytest.mark.parametrize("name", ["CSVGN4", "CSVGN5"])
