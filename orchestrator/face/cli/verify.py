@@ -87,11 +87,12 @@ def _verify_file(options: argparse.Namespace, asked: Asked) -> int:
 
 def _verified(options: argparse.Namespace, place: Path, asked: Asked) -> tuple[dict[str, Any], int]:
     console = make_console(stderr=options.json)
+    computed_anew = () if options.files_only else options.points or options.rows
     with progress_bar(console) as bar:
         task = bar.add_task("Points", total=None)
         found = verified(
             place,
-            () if options.files_only else options.points or options.rows,
+            computed_anew,
             lambda imports: choose_executor(options, imports),
             lambda done, total: bar.update(task, completed=done, total=total),
             every=options.all,

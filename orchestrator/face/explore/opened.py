@@ -61,6 +61,7 @@ def certified(file: Path) -> tuple[str, dict[str, Any]]:
     if not whole:
         raise InputError(f"{file}: no certificate is in it, as none of its devices could be tested")
     names = list(dict.fromkeys(device for row in whole.values() for device in row))
+    grid = [[row.get(name) for name in names] for row in whole.values()]
     return word, {
         "title": "; ".join(said),
         "kind": "certificate",
@@ -68,7 +69,7 @@ def certified(file: Path) -> tuple[str, dict[str, Any]]:
         "followed": False,
         "rows": [{"name": name} for name in whole],
         "columns": [{"name": name} for name in names],
-        "cells": [[row.get(name) for name in names] for row in whole.values()],
+        "cells": grid,
     }
 
 

@@ -119,6 +119,12 @@ def simulated(scenario: Scenario, wanted: Sequence[str], say: Say) -> dict[str, 
     run: Run = scenario.run(observers=[Streamed(scenario, names, say)])
     folder = run.save(Path("results") / "explore" / f"{scenario.prepared.case.name}_{new_run_id()}")
     drawn = curves(run.dataset, names)
+    ring_down = None
+    if run.ring_down is not None:
+        ring_down = {
+            "frequency_hz": run.ring_down.frequency_hz,
+            "damping_percent": run.ring_down.damping_percent,
+        }
     return {
         "folder": str(folder),
         "curves": drawn,
@@ -126,12 +132,7 @@ def simulated(scenario: Scenario, wanted: Sequence[str], say: Say) -> dict[str, 
         "answer": run.summary()["answer"],
         "findings": [finding.message for finding in run.findings],
         "ended_early": None if run.failure is None else str(run.failure),
-        "ring_down": None
-        if run.ring_down is None
-        else {
-            "frequency_hz": run.ring_down.frequency_hz,
-            "damping_percent": run.ring_down.damping_percent,
-        },
+        "ring_down": ring_down,
     }
 
 

@@ -135,61 +135,57 @@ class Desk:
         """Answer what is asked for under ``ask``: open, cell, parameters, modes, movers, slopes, first, response,
         recorded, run, save."""
         ask = str(question["ask"])
-        case = self._read()
+        original = self._read()
         if ask == "open":
-            titles = {name: table.title or name for name, table in case.file.scenarios.items()}
-            named = case.file.table.title or case.name
-            systems = {
-                name: table.model_dump_json(exclude={"title", "events"})
-                for name, table in case.file.scenarios.items()
-            }
-            return {
-                "case": case.name,
-                "title": named,
-                "scenarios": titles,
-                "systems": systems,  # equal where scenarios differ in their events alone
-                "stamp": self._stamp,
-            }
-        events, original = question.get("events"), case
+            return {**_titles(original), "stamp": self._stamp}
+        changed, events = original, question.get("events")
         if events is not None:
-            case = case.with_(scenarios={question["scenario"]: {"events": events}})
+            changed = original.with_(scenarios={question["scenario"]: {"events": events}})
         name = str(question["scenario"])
-        scenario = partial(case.scenario, name, step=question.get("step"))
         values: dict[str, Value] = dict(question.get("values") or {})
+        if ask == "cell":
+            answer: dict[str, Any] = {"values": self._values_of(changed, question, values)}
+        elif ask == "save":
+            file = explored(changed.file, name, values, question.get("places"))
+            answer = {"file": str(saved(original.file, file, _FOLDER))}
+        else:
+            answer = self._of_scenario(ask, changed, values, question, say)
+        return {**answer, "stamp": self._stamp}
+
+    def _of_scenario(
+        self,
+        ask: str,
+        changed: Case,
+        values: dict[str, Value],
+        question: Mapping[str, Any],
+        say: Say,
+    ) -> dict[str, Any]:
+        """The answer to a question about a scenario with the values that the page has set."""
+        name = str(question["scenario"])
+        scenario = partial(changed.scenario, name, step=question.get("step"))
         low, high = question.get("range") or (0.1, 2.0)
         signals = question.get("signals") or ()
-        if ask == "cell":
-            return {"values": self._values_of(case, question, values), "stamp": self._stamp}
-        answers: dict[str, Callable[[], dict[str, Any]]] = {
-            "parameters": lambda: _parameters(case, scenario(values)),
-            "modes": lambda: self._modes(case, scenario(values), values, (low, high), question),
-            "slopes": lambda: slopes(
-                scenario, values, str(question["parameter"]), (low, high), say, self._computed
-            ),
-            "movers": lambda: movers(
-                scenario(values),
-                question.get("components") or {},
-                (low, high),
-                question.get("names") or (),
-                say,
-            ),
-            "response": lambda: linear(scenario(values), signals),
-            "first": lambda: linear(scenario(values), ()),
-            "recorded": lambda: recorded(
-                self._recorded.get(name, self._recorded.get("", "")), scenario(values), signals
-            ),
-            "save": lambda: {
-                "file": str(
-                    saved(
-                        original.file,
-                        explored(case.file, name, values, question.get("places")),
-                        _FOLDER,
-                    )
-                )
-            },
-            "run": lambda: simulated(scenario(values), signals, lambda part: say({"part": part})),
-        }
-        return {**answers[ask](), "stamp": self._stamp}
+        match ask:
+            case "parameters":
+                return _parameters(changed, scenario(values))
+            case "modes":
+                return self._modes(changed, scenario(values), values, (low, high), question)
+            case "slopes":
+                parameter = str(question["parameter"])
+                return slopes(scenario, values, parameter, (low, high), say, self._computed)
+            case "movers":
+                components, names = question.get("components") or {}, question.get("names") or ()
+                return movers(scenario(values), components, (low, high), names, say)
+            case "response":
+                return linear(scenario(values), signals)
+            case "first":
+                return linear(scenario(values), ())
+            case "recorded":
+                place = self._recorded.get(name, self._recorded.get("", ""))
+                return recorded(place, scenario(values), signals)
+            case "run":
+                return simulated(scenario(values), signals, lambda part: say({"part": part}))
+        raise KeyError(ask)
 
     def _read(self) -> Case:
         stamp = _stamp(self._case.file.path) if self._case else []
@@ -257,18 +253,19 @@ class Desk:
     ) -> dict[str, Any]:
         """The JSON of ``gfor modes``, the verdict in its words, and what reproduces it."""
         modes, system = self._computed(scenario, frequencies), scenario.prepared.system
-        hidden, parts = modes.result.hidden, [(key, *key.partition(".")) for key in values]
+        hidden = modes.result.hidden
+        idle = {}
+        for key in values:
+            component, _, variable = key.partition(".")
+            if component in system.components:
+                idle[key] = why_idle(system, component, variable)
         return {
             "modes": modes.as_json(),
             "title": scenario.title,
             "verdict": modes.stability.sentence(),
             "outside": None if hidden is None else hidden.sentence(remedy=False),
             "warnings": [*_questions(scenario), *modes.result.unasked],
-            "idle": {
-                key: why_idle(system, one, name)
-                for key, one, _, name in parts
-                if one in system.components
-            },
+            "idle": idle,
             "swings": [
                 [*modes.result.swing_of(mode), modes.result.in_between(mode)] for mode in modes
             ],
@@ -283,6 +280,21 @@ class Desk:
                 step=question.get("step"),
             ),
         }
+
+
+def _titles(case: Case) -> dict[str, Any]:
+    """Names and titles of a case and its scenarios, by which the page begins."""
+    scenarios = case.file.scenarios
+    return {
+        "case": case.name,
+        "title": case.file.table.title or case.name,
+        "scenarios": {name: table.title or name for name, table in scenarios.items()},
+        # equal where scenarios differ in their events alone
+        "systems": {
+            name: table.model_dump_json(exclude={"title", "events"})
+            for name, table in scenarios.items()
+        },
+    }
 
 
 def _parameters(case: Case, scenario: Scenario) -> dict[str, Any]:

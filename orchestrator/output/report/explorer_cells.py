@@ -77,8 +77,8 @@ class Cells:
             "step": self.step,
             "followed": self.followed,
             "left_out": max(0, len(self.rows) - fit),
-            "rows": [asdict(side) for side in self.rows[:fit]],
-            "columns": [asdict(side) for side in self.columns],
+            "rows": list(map(asdict, self.rows[:fit])),
+            "columns": list(map(asdict, self.columns)),
             "cells": [list(map(_figures_of, row)) for row in self.cells[:fit]],
         }
         save_json(content, staging / CELLS)

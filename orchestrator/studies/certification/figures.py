@@ -101,6 +101,7 @@ def fit_errors_of(c: Certificate) -> dict[str, float]:
 
 def damping_json(c: DampingCertificate) -> dict[str, Any]:
     missing = missing_of(c)
+    acceptance = None if c.acceptance is None else dict(c.acceptance.report)
     return {
         "format": NORM,
         "norm": c.code.source,
@@ -126,7 +127,7 @@ def damping_json(c: DampingCertificate) -> dict[str, Any]:
         "pod_source": c.controllers.source,
         "pod_values": dict(c.controllers.settings),
         "parameters": [asdict(row) for row in parameter_rows(c)],
-        "acceptance": None if c.acceptance is None else dict(c.acceptance.report),
+        "acceptance": acceptance,
         "signal": c.signal,
         "event_time": c.event_time,
         "linearised": linearised_of(c),
@@ -139,6 +140,9 @@ def damping_json(c: DampingCertificate) -> dict[str, Any]:
 def _point_json(c: Certificate, v: PointVerdict) -> dict[str, Any]:
     points = {name: c.results[name, v.X_L] for name in (WITHOUT, WITH)}
     having, without = points[WITH], points[WITHOUT].modes
+    modes_without = []
+    if without is not None:
+        modes_without = list(map(_figures, without.eigenvalues.tolist()))
     lowered = [
         {
             "frequency_hz": m.frequency_hz,
@@ -147,34 +151,41 @@ def _point_json(c: Certificate, v: PointVerdict) -> dict[str, Any]:
         }
         for m in v.lowered
     ]
-    return {
+    growth = {name: number(p.growth) for name, p in points.items()}
+    stability = {name: p.stability for name, p in points.items()}
+    residual = {name: number(p.residual) for name, p in points.items()}
+    findings = {name: p.findings for name, p in points.items()}
+    warnings = {name: list(p.warnings) for name, p in points.items()}
+    identified = having.identified is not None
+    again = {name: commands(v.X_L, name, identified=identified) for name in points}
+    content = {
         "X_L": v.X_L,
         "accepted": v.accepted,
         "judged": v.is_judged,
         "faults": list(v.faults),
         "unknown": v.unknown,
-        "modes": [mode_json(m) for m in v.modes],
-        "modes_beside": [mode_json(m) for m in v.neighbours],
-        "modes_without": []
-        if without is None
-        else list(map(_figures, without.eigenvalues.tolist())),
+        "modes": list(map(mode_json, v.modes)),
+        "modes_beside": list(map(mode_json, v.neighbours)),
+        "modes_without": modes_without,
         "lowered": lowered,
-        "growth": {name: number(p.growth) for name, p in points.items()},
-        "stability": {name: p.stability for name, p in points.items()},
-        "residual": {name: number(p.residual) for name, p in points.items()},
+        "growth": growth,
+        "stability": stability,
+        "residual": residual,
         "power": having.power,
-        "findings": {name: p.findings for name, p in points.items()},
+        "findings": findings,
         "converter_model": {
             "source": having.linearised.get(CONVERTER),
             "order": having.identified,
             "fit_error": having.fit_errors.get(CONVERTER),
         },
-        "warnings": {name: list(p.warnings) for name, p in points.items()},
+        "warnings": warnings,
         "time": None if v.time is None else time_json(v.time),
         "time_without": None if v.base_time is None else time_json(v.base_time),
-        "again": {n: commands(v.X_L, n, identified=having.identified is not None) for n in points},
-        **({} if v.pod is None else {"pod": v.pod.as_json()}),
+        "again": again,
     }
+    if v.pod is not None:
+        content["pod"] = v.pod.as_json()
+    return content
 
 
 def commands(X_L: float, scenario: str, *, identified: bool) -> dict[str, str]:

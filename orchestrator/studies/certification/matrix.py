@@ -202,6 +202,8 @@ def matrix_json(matrix: CertificateMatrix, devices: Sequence[Device]) -> dict[st
 
 def _cell_json(cell: MatrixCell) -> dict[str, Any]:
     least = cell.narrowest
+    certificate = f"{cell.folder}/{JSON}" if cell.has_certificate else None
+    needs = f"{cell.folder}/{NEEDS_JSON}" if cell.has_needs else None
     return {
         "device": cell.device,
         "code": cell.code,
@@ -213,10 +215,10 @@ def _cell_json(cell: MatrixCell) -> dict[str, Any]:
         "missing": cell.missing,
         "acceptance_failed": cell.refused,
         "narrowest": None if least is None else asdict(least),
-        "failed": [asdict(m) for m in cell.failed],
-        "certificate": f"{cell.folder}/{JSON}" if cell.has_certificate else None,
+        "failed": list(map(asdict, cell.failed)),
+        "certificate": certificate,
         "figures": cell.file_of_figures,
-        "sensitivities": f"{cell.folder}/{NEEDS_JSON}" if cell.has_needs else None,
+        "sensitivities": needs,
     }
 
 

@@ -99,30 +99,43 @@ def _point(
     signals = {
         str(name): values.values for name, values in kept.items() if not np.isnan(values).all()
     }
-    growth, model = point["growth"][scenario], point["converter_model"]
-    sources, error = dict(content["linearised"]), model["fit_error"]
-    if having and model["source"] is not None:
-        sources[CONVERTER] = model["source"]
     shapes = np.empty((len(modes), 0), complex)
-    residual = point.get("residual", {}).get(scenario)
     values = np.array([_value(mode) for mode in modes], dtype=complex)
-    off = kept_off(point["pod"]) if having and "pod" in point else {}
-    return PointResult(
+    result = PointResult(
         point["X_L"],
         scenario,
         ModeSet(values, shapes, shapes, ()),
-        growth=np.nan if growth is None else growth,
+        growth=_number(point["growth"][scenario]),
         stability=point["stability"][scenario],
-        residual=np.nan if residual is None else residual,
-        identified=model["order"] if having else None,
-        linearised=sources if having else {},
-        fit_errors={CONVERTER: error} if having and error is not None else {},
-        power=point["power"] if having else None,
+        residual=_number(point.get("residual", {}).get(scenario)),
         times=responses["time"].values,
         signals=signals,
         warnings=tuple(point.get("warnings", {}).get(scenario, ())),
         findings=point.get("findings", {}).get(scenario, []),
         units={str(name): str(values.attrs.get("units", "")) for name, values in kept.items()},
+    )
+    return _with_converter(result, point, content) if having else result
+
+
+def _number(stated: float | None) -> float:
+    return np.nan if stated is None else stated
+
+
+def _with_converter(
+    result: PointResult, point: dict[str, Any], content: dict[str, Any]
+) -> PointResult:
+    """The result with the figures that only the point with the converter has."""
+    model, sources = point["converter_model"], dict(content["linearised"])
+    if model["source"] is not None:
+        sources[CONVERTER] = model["source"]
+    error = model["fit_error"]
+    off = kept_off(point["pod"]) if "pod" in point else {}
+    return replace(
+        result,
+        identified=model["order"],
+        linearised=sources,
+        fit_errors={} if error is None else {CONVERTER: error},
+        power=point["power"],
         **off,
     )
 

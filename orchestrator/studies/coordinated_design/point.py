@@ -222,6 +222,7 @@ def _modes(
     place = {complex(value): k for k, value in enumerate(spectrum.eigenvalues.tolist())}
     named = named_modes(case, model, modes).named
     exists = index_of_rightmost(spectrum.eigenvalues) is not None
+    rightmost = _who(spectrum.rightmost) if exists else ""
     return PointModes(
         Status.COMPUTED,
         warnings=warnings,
@@ -230,7 +231,7 @@ def _modes(
         swinging=tuple(place[mode.eigenvalue] for mode in modes),
         named={name: place[mode.eigenvalue] for name, mode in named.items()},
         who=tuple(map(_who, modes)),
-        rightmost=_who(spectrum.rightmost) if exists else "",
+        rightmost=rightmost,
         loops=loops,
         clocks=model.clocks,
     )

@@ -100,7 +100,17 @@ class CoordinatedDesign(NoTruth, ask=".met, which is True, False, or None where 
 
 def as_json(design: PointsDesign) -> dict[str, Any]:
     plan, request, verdict = design.plan, design.plan.request, design.verdict
-    limiting = verdict.limiting
+    lowered = [
+        _where(point) | {"before": _mode(point.target_before), "after": _mode(point.target)}
+        for point in verdict.lowered
+    ]
+    apart = [_where(point) | {"mode": _mode(mode)} for point, mode in verdict.apart]
+    limiting = None
+    if verdict.limiting is not None:
+        limiting = _where(verdict.limiting) | {"mode": _mode(verdict.limiting.target)}
+    failed = [_where(point) | {"why": point.why_not} for point in verdict.failed]
+    harmed = [_where(point) | {"mode": _mode(point.other)} for point in verdict.harmed]
+    astray = [_where(point) | {"difference": point.astray} for point in verdict.astray]
     return {
         **plan.prepared.about,
         "verdict": verdict_sentence(verdict),
@@ -110,60 +120,58 @@ def as_json(design: PointsDesign) -> dict[str, Any]:
         "modes": list(request.modes) or "all",
         "least_damping_of_others": request.least_damping,
         "gain_bounds": list(request.gain_bounds),
-        "lowered": [
-            _where(point) | {"before": _mode(point.target_before), "after": _mode(point.target)}
-            for point in verdict.lowered
-        ],
+        "lowered": lowered,
         "worst_damping_ratio": {"before": verdict.worst_before, "after": verdict.worst},
         "least_of_all": {
             "before": _least_json(verdict.least_before, "least_before"),
             "after": _least_json(verdict.least, "least"),
         },
-        "apart": [_where(point) | {"mode": _mode(mode)} for point, mode in verdict.apart],
+        "apart": apart,
         "thin_margin_damping_ratio": verdict.thin,
-        "limiting": None
-        if limiting is None
-        else _where(limiting) | {"mode": _mode(limiting.target)},
+        "limiting": limiting,
         "points": len(plan.read.points),
         "outages": len(plan.read.outages) - 1,
         "items": len(verdict.points),
-        "failed": [_where(point) | {"why": point.why_not} for point in verdict.failed],
-        "unstable": [_where(point) for point in verdict.unstable],
-        "harmed": [_where(point) | {"mode": _mode(point.other)} for point in verdict.harmed],
-        "astray": [_where(point) | {"difference": point.astray} for point in verdict.astray],
-        "unforeseen": [_where(point) for point in verdict.unforeseen],
+        "failed": failed,
+        "unstable": list(map(_where, verdict.unstable)),
+        "harmed": harmed,
+        "astray": astray,
+        "unforeseen": list(map(_where, verdict.unforeseen)),
         "warnings": [*about_settings(design), *remarks(verdict)],
         "left_out": [group.name for group in design.left_out],
-        "settings": [
-            {
-                "controller": group.controller,
-                "components": list(group.components),
-                "K": setting.gain,
-                "T_S1": None if group.has_gain_alone else setting.filters.T_S1,
-                "T_S2": None if group.has_gain_alone else setting.filters.T_S2,
-                "N_S": None if group.has_gain_alone else group.stages,
-            }
-            for group, setting in design.used
-        ],
-        "all": [
-            _where(point)
-            | {
-                "stable": point.stable,
-                "before": _mode(point.target_before),
-                "after": _mode(point.target),
-                "least_of_all_before": _mode(point.least_before),
-                "least_of_all_after": _mode(point.least),
-                "allowed": None if point.worth is None else point.worth.allowed,
-                "why": point.why_not,
-            }
-            for point in verdict.points
-        ],
-        "ranking": [_ranked(one) for one in design.ranking],
+        "settings": [_setting_json(group, setting) for group, setting in design.used],
+        "all": list(map(_point_json, verdict.points)),
+        "ranking": list(map(_ranked, design.ranking)),
         "search": {
             "worst_damping_ratio": design.found.worth.worst,
             "evaluations": design.evaluations,
             "linear_programs": design.found.steps,
         },
+    }
+
+
+def _setting_json(group: PodGroup, setting: PodSetting) -> dict[str, Any]:
+    compensation: dict[str, float | None] = dict.fromkeys(("T_S1", "T_S2", "N_S"))
+    if not group.has_gain_alone:
+        T_S1, T_S2 = setting.filters.T_S1, setting.filters.T_S2
+        compensation = {"T_S1": T_S1, "T_S2": T_S2, "N_S": group.stages}
+    return {
+        "controller": group.controller,
+        "components": list(group.components),
+        "K": setting.gain,
+        **compensation,
+    }
+
+
+def _point_json(point: JudgedPoint) -> dict[str, Any]:
+    return _where(point) | {
+        "stable": point.stable,
+        "before": _mode(point.target_before),
+        "after": _mode(point.target),
+        "least_of_all_before": _mode(point.least_before),
+        "least_of_all_after": _mode(point.least),
+        "allowed": None if point.worth is None else point.worth.allowed,
+        "why": point.why_not,
     }
 
 
@@ -188,16 +196,20 @@ def _mode(mode: PlacedMode | None) -> dict[str, Any] | None:
 
 def _ranked(one: RankedConverter) -> dict[str, Any]:
     setting = one.setting
-    # without stages that are designed there are no time constants: the device's own may be others
-    times = None if setting is None or not one.stages else setting.filters
+    gain = T_S1 = T_S2 = None
+    if setting is not None:
+        gain = setting.gain
+        # without stages that are designed there are no time constants: the device's own may be others
+        if one.stages:
+            T_S1, T_S2 = setting.filters.T_S1, setting.filters.T_S2
     return {
         "component": one.place.component,
         "controller": one.place.controller,
         "worst_damping_ratio": one.worst,
         "worst_damping_ratio_of_all_modes": one.least,
-        "K": None if setting is None else setting.gain,
-        "T_S1": None if times is None else times.T_S1,
-        "T_S2": None if times is None else times.T_S2,
+        "K": gain,
+        "T_S1": T_S1,
+        "T_S2": T_S2,
         "shift_rad_s_per_pu": one.shift,
     }
 
@@ -240,11 +252,7 @@ def points_table(verdict: PointsVerdict) -> ColumnTable[JudgedPoint]:
             Column("Point", lambda p: p.point.name, name="point"),
             Column("Outage", lambda p: p.outage.name, name="outage"),
             Column("", lambda p: p.point.hours, name="hours"),
-            Column(
-                "",
-                lambda p: str((p.after if p.before.computed else p.before).status),
-                name="status",
-            ),
+            Column("", _status, name="status"),
             Column("", lambda p: _lower(p.stable), name="stable"),
             Column(
                 "before [%]",
@@ -271,16 +279,22 @@ def points_table(verdict: PointsVerdict) -> ColumnTable[JudgedPoint]:
             Column(
                 "", lambda p: "" if p.worth is None else _lower(p.worth.allowed), name="allowed"
             ),
-            Column(
-                "",
-                lambda p: "; ".join(text for text in (p.why_not, *p.after.warnings) if text),
-                name="why",
-            ),
+            Column("", _reason, name="why"),
             Column("Stable", lambda p: {True: "yes", False: "NO", None: "not known"}[p.stable]),
         ),
         verdict.points,
         left=2,
     )
+
+
+def _status(point: JudgedPoint) -> str:
+    """The status with the controllers, or that before where already this could not be computed."""
+    return str(point.after.status if point.before.computed else point.before.status)
+
+
+def _reason(point: JudgedPoint) -> str:
+    """Why it has no figures, and what is to be doubted of those that it has."""
+    return "; ".join(filter(None, (point.why_not, *point.after.warnings)))
 
 
 def _lower(value: bool | None) -> str:
@@ -317,20 +331,12 @@ def ranking_table(design: PointsDesign) -> ColumnTable[RankedConverter]:
     def in_format(form: str) -> Callable[[Any], str]:
         return lambda figure: "–" if figure == "" else f"{figure:{form}}"
 
-    def damping(figure: Callable[[RankedConverter], float | None]) -> Callable[[Any], str]:
-        def cell(one: RankedConverter) -> str:
-            if one.setting is None:
-                return "–"
-            found = figure(one)
-            return "unstable or not known" if found is None else f"{100 * found:.2f}"
-
-        return cell
-
     names = design.plan.request.modes
-    several = names or any(one.worst != one.least for one in design.ranking)
-    of_those = "of the modes that any moves [%]"
+    of_wanted, of_all = "least damping [%]", ""
+    if names or any(one.worst != one.least for one in design.ranking):
+        of_wanted, of_all = "of the modes that any moves [%]", "of all modes [%]"
     if names:
-        of_those = f"of {', '.join(names)} [%]"
+        of_wanted = f"of {', '.join(names)} [%]"
 
     title = "Converters by what a controller there alone gives: the least damping of all points, computed anew"
     return ColumnTable(
@@ -338,26 +344,10 @@ def ranking_table(design: PointsDesign) -> ColumnTable[RankedConverter]:
         (
             Column("Converter", lambda one: one.place.component, name="converter"),
             Column("Controller", lambda one: one.place.controller, name="controller"),
-            Column(
-                of_those if several else "least damping [%]",
-                lambda one: one,
-                damping(lambda one: one.worst),
-            ),
-            Column(
-                "of all modes [%]" if several else "",
-                lambda one: one,
-                damping(lambda one: one.least),
-            ),
-            Column(
-                "",
-                lambda one: "" if one.worst is None else 100 * one.worst,
-                name="least_damping_percent",
-            ),
-            Column(
-                "",
-                lambda one: "" if one.least is None else 100 * one.least,
-                name="least_damping_of_all_percent",
-            ),
+            Column(of_wanted, lambda one: _least_damping(one, one.worst)),
+            Column(of_all, lambda one: _least_damping(one, one.least)),
+            Column("", lambda one: _percent(one.worst), name="least_damping_percent"),
+            Column("", lambda one: _percent(one.least), name="least_damping_of_all_percent"),
             Column("K [pu]", setting("K"), in_format(".4g"), "K"),
             Column("T_S1 [s]", setting("T_S1"), in_format(".4f"), "T_S1"),
             Column("T_S2 [s]", setting("T_S2"), in_format(".4f"), "T_S2"),
@@ -373,6 +363,16 @@ def ranking_table(design: PointsDesign) -> ColumnTable[RankedConverter]:
         _ROWS,
         "the files",
     )
+
+
+def _least_damping(one: RankedConverter, ratio: float | None) -> str:
+    if one.setting is None:
+        return "–"
+    return "unstable or not known" if ratio is None else f"{100 * ratio:.2f}"
+
+
+def _percent(ratio: float | None) -> float | str:
+    return "" if ratio is None else 100 * ratio
 
 
 def provenance(design: PointsDesign, command: str) -> list[str]:

@@ -149,10 +149,13 @@ class CutResult:
             for s, scan in self.scans.items()
             if scan.points
         }
-        of = self.request.network
-        return (
-            {"models": of.models, "basis": of.basis} if isinstance(of, PreparedScenario) else {}
-        ) | {
+        of, about = self.request.network, {}
+        if isinstance(of, PreparedScenario):
+            about = {"models": of.models, "basis": of.basis}
+        poles = [{"real": p.real, "imag": p.imag} for p in j.open_loop]
+        crossings = [{"real": c.real, "frequency_hz": c.frequency_hz} for c in j.crossings]
+        active = {side: [list(band) for band in bands] for side, bands in j.active.items()}
+        return about | {
             "verdict": str(self.verdict),
             "reasons": list(j.reasons),
             "sentence": f"{self.verdict}: {self.because}",
@@ -163,12 +166,12 @@ class CutResult:
             "range_hz": list(j.range_hz),
             "growing_modes": j.growing,
             "encirclements": {"determinant": j.encirclements, "eigenloci": j.by_loci},
-            "open_loop_unstable_poles": [{"real": p.real, "imag": p.imag} for p in j.open_loop],
+            "open_loop_unstable_poles": poles,
             "modes_stable": None if self.cut is None or self.scans else self.cut.modes_stable,
-            "crossings": [{"real": c.real, "frequency_hz": c.frequency_hz} for c in j.crossings],
+            "crossings": crossings,
             "margins": margins_json(self.margins),
             "buses": self._buses_json(),
-            "critical": [vars(one) for one in self.critical],
+            "critical": list(map(vars, self.critical)),
             "strength": {
                 "short_circuit_mva": self.short_circuit,
                 "scr": self.scr,
@@ -176,8 +179,8 @@ class CutResult:
                 "gscr": self.gscr,
             },
             "difference_from_case": self.difference,
-            "active_hz": {side: [list(band) for band in bands] for side, bands in j.active.items()},
-            "small_gain_hz": [list(band) for band in j.small_gain],
+            "active_hz": active,
+            "small_gain_hz": list(map(list, j.small_gain)),
             "operating_points": points,
             "questions": list(self.questions),
         }

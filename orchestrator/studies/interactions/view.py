@@ -51,6 +51,16 @@ PAGE = "interactions.html"
 _UNFOLLOWED = "not followed"
 _LEAST = "; least: of the vendors' modes, if it cannot be followed"
 
+_OF_MODE = (
+    "mode_hz",
+    "mode_together_percent",
+    "mode_first_alone_percent",
+    "mode_second_alone_percent",
+    "mode_neither_percent",
+    "mode_not_followed",
+)
+"""Names of a followed mode's figures in the JSON of a pair."""
+
 _LEAST_SHARE = 0.005
 _CELL = 96  # side of a square of the matrix [px]
 _MARGIN = 120  # space for the names above and left of it [px]
@@ -279,16 +289,17 @@ def pairs_table(judgement: JudgedInteractions) -> ColumnTable[JudgedPair]:
             return "–"
         return f"{'least ' * pair.falls_unfollowed}{pair.fall:+.2f}"
 
-    columns = (
-        Column[JudgedPair]("Pair", lambda pair: pair.text),
-        Column[JudgedPair](
-            "Mode", lambda pair: "" if pair.mode is None else place_of(pair.mode.together)
-        ),
+    def place(pair: JudgedPair) -> str:
+        return "" if pair.mode is None else place_of(pair.mode.together)
+
+    columns: tuple[Column[JudgedPair], ...] = (
+        Column("Pair", lambda pair: pair.text),
+        Column("Mode", place),
         column("Neither [%]", lambda mode: mode.neither_percent),
         alone("First alone [%]", 0),
         alone("Second alone [%]", 1),
         column("Together [%]", lambda mode: mode.together.damping_percent),
-        Column[JudgedPair]("Falls by [points]", fall),
+        Column("Falls by [points]", fall),
     )
     least = any(pair.falls_unfollowed for pair in judgement.pairs)
     title = f"One mode of each pair, followed{_LEAST * least}"
@@ -329,19 +340,12 @@ def warnings_of(judgement: JudgedInteractions) -> list[str]:
 
 def _pair(pair: JudgedPair) -> dict[str, Any]:
     each = zip(("first", "second"), pair.vendors, pair.alone, strict=True)
-    mode = pair.mode
-    first, second = (None, None) if mode is None else mode.alone_percent
     return {
         "vendors": pair.text,
         "stable": pair.joint.stable,
         "least_damping_percent": pair.joint.least_damping,
         "frequency_hz": None if pair.joint.critical is None else pair.joint.critical.frequency_hz,
-        "mode_hz": None if mode is None else mode.together.frequency_hz,
-        "mode_together_percent": None if mode is None else mode.together.damping_percent,
-        "mode_first_alone_percent": first,
-        "mode_second_alone_percent": second,
-        "mode_neither_percent": None if mode is None else mode.neither_percent,
-        "mode_not_followed": None if mode is None else mode.unknown or None,
+        **_figures_of_mode(pair.mode),
         "falls_by_points": pair.fall,
         "falls_by_least_damping": pair.falls_unfollowed,
         "unstable_though_stable_alone": pair.fights,
@@ -353,9 +357,32 @@ def _pair(pair: JudgedPair) -> dict[str, Any]:
     }
 
 
+def _figures_of_mode(mode: FollowedMode | None) -> dict[str, Any]:
+    """One mode followed through a pair's systems; each figure is None where no mode is."""
+    if mode is None:
+        return dict.fromkeys(_OF_MODE)
+    values = (
+        mode.together.frequency_hz,
+        mode.together.damping_percent,
+        *mode.alone_percent,
+        mode.neither_percent,
+        mode.unknown or None,
+    )
+    return dict(zip(_OF_MODE, values, strict=True))
+
+
 def as_json(judgement: JudgedInteractions) -> dict[str, Any]:
     plan, worst, swap = judgement.result.plan, judgement.worst_pair, judgement.worst_assignment
     groups = plan.groups
+    pairs = [
+        _pair(pair)
+        | {"vendors": list(pair.vendors), "sentence": pair.sentence()}
+        | _system(pair.joint, groups)
+        for pair in judgement.pairs
+    ]
+    unknown = [
+        list(pair.vendors) for pair in (*judgement.unknown_pairs, *judgement.uncompared_pairs)
+    ]
     found: dict[str, Any] = {
         **plan.prepared.about,
         "stand_in": plan.stand_in,
@@ -365,20 +392,15 @@ def as_json(judgement: JudgedInteractions) -> dict[str, Any]:
         "places": {name: place.vendor for name, place in plan.places.items()},
         "groups": groups,
         "as_in_the_case": _system(judgement.whole, groups),
-        "interaction_modes": [_shared(judged) for judged in judgement.interaction_modes],
+        "interaction_modes": list(map(_shared, judgement.interaction_modes)),
         "no_vendor": _system(judgement.none, groups),
         "alone": {vendor: _system(system, groups) for vendor, system in judgement.alone.items()},
-        "pairs": [
-            _pair(pair)
-            | {"vendors": list(pair.vendors), "sentence": pair.sentence()}
-            | _system(pair.joint, groups)
-            for pair in judgement.pairs
-        ],
-        "worst_pair": None if worst is None else list(worst.vendors),
-        "unknown_pairs": [
-            list(pair.vendors) for pair in (*judgement.unknown_pairs, *judgement.uncompared_pairs)
-        ],
+        "pairs": pairs,
+        "worst_pair": None,
+        "unknown_pairs": unknown,
     }
+    if worst is not None:
+        found["worst_pair"] = list(worst.vendors)
     if plan.swapped:
         found["assignments"] = [
             {"at": dict(zip(plan.swapped, system.name.names, strict=True))}

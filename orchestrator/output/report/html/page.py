@@ -366,15 +366,17 @@ def _answers(chapters: Sequence[Chapter]) -> list[Answer]:
 
 
 def _answer_of(chapter: Chapter) -> Answer:
-    source, is_folder = chapter.source, chapter.source.is_dir()
+    source, folder = chapter.source.name, chapter.source.absolute().parent.name
+    if chapter.source.is_dir():
+        source, folder = "", chapter.source.name
     not_judged = "".join(f"; not judged: {text}" for text in chapter.not_judged)
     return {
         "question": chapter.question,
-        "source": "" if is_folder else source.name,
+        "source": source,
         "answer": chapter.answer + not_judged,
         "given": given_in(chapter.origin),
         "least": [mode.as_json() for mode in chapter.least],
-        "folder": (source if is_folder else source.absolute().parent).name,
+        "folder": folder,
     }
 
 

@@ -38,21 +38,21 @@ def save_needs(plan: ChangePlan, needs: Sequence[CriterionNeeds], folder: Path) 
 
 
 def needs_json(plan: ChangePlan, needs: Sequence[CriterionNeeds]) -> dict[str, Any]:
-    failed = [
-        {
-            "row": n.row,
-            **asdict(n.criterion),
-            "sensitivities": [_row_json(s) for s in n.sensitivities],
-            "confirmed": None if n.confirmed is None else _confirmed_json(n.confirmed),
-        }
-        for n in needs
-    ]
     return {
         "format": FORMAT,
         "code": plan.certificate.code.key,
         "change": plan.change,
-        "failed": failed,
+        "failed": [_need_json(need) for need in needs],
         "left_out": dict(plan.left_out),
+    }
+
+
+def _need_json(need: CriterionNeeds) -> dict[str, Any]:
+    return {
+        "row": need.row,
+        **asdict(need.criterion),
+        "sensitivities": [_row_json(s) for s in need.sensitivities],
+        "confirmed": None if need.confirmed is None else _confirmed_json(need.confirmed),
     }
 
 

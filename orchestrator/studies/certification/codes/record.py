@@ -73,20 +73,7 @@ def _row(v: RowVerdict, c: Certificate) -> dict[str, Any]:
 
 def row_chapters(c: Certificate, figures: Figures) -> list[tuple[str, str]]:
     """Return what the page of a certificate says of its rows."""
-    rows = [
-        [
-            escape(v.name),
-            *([escape(v.row.clause), escape(v.row.title)] if f is v.findings[0] else ["", ""]),
-            escape(f.criterion),
-            escape(f.rule),
-            "the code's" if f.origin == "code" else "reading",
-            escape(f.text),
-            margin_of(f),
-            _word(v, f),
-        ]
-        for v in c.verdicts
-        for f in v.findings
-    ]
+    rows = [_cells_of_finding(v, f) for v in c.verdicts for f in v.findings]
     rows += [
         [
             escape(v.name),
@@ -119,6 +106,24 @@ def row_chapters(c: Certificate, figures: Figures) -> list[tuple[str, str]]:
         ("Result", table("All criteria", columns, rows, left=9) + without),
         ("Responses and their limits", _pictures(c, figures)),
         ("What was not tested", bullet_list([*c.code.left_out, *c.departures])),
+    ]
+
+
+def _cells_of_finding(v: RowVerdict, f: RowFinding) -> list[str]:
+    """One criterion of a row; clause and title of the row stand beside its first one alone."""
+    clause, title = ("", "")
+    if f is v.findings[0]:
+        clause, title = escape(v.row.clause), escape(v.row.title)
+    return [
+        escape(v.name),
+        clause,
+        title,
+        escape(f.criterion),
+        escape(f.rule),
+        "the code's" if f.origin == "code" else "reading",
+        escape(f.text),
+        margin_of(f),
+        _word(v, f),
     ]
 
 

@@ -248,17 +248,14 @@ def of_sensitivities(file: Path, c: Content) -> Chapter:
     said = ", ".join(f"{r['parameter']} ({r[key]:+.2g})" for r in first) or "no parameter"
     answer = f"{mode['frequency_hz']:.3f} Hz, {mode['damping_percent']:.2f} %: most by {said} points for 1 % more"
     answer = f"UNSTABLE; {answer}" if c["stable"] is False else answer
-    size = "Points by 1 %, without sign"
-    bars = (
-        bar_chart(
+    bars = ""
+    if first:
+        bars = bar_chart(
             "Points of damping",
             [r["parameter"] for r in first],
             [("1 % more", colour(1), [abs(r[key]) for r in first])],
-            size,
+            "Points by 1 %, without sign",
         )
-        if first
-        else ""
-    )
     columns = ["Parameter", "Value", "Points by 1 %", "Hz by 1 %", "Doubts"]
     return Chapter(
         file,
