@@ -6,6 +6,7 @@ import queue
 import secrets
 import threading
 import time
+from functools import partial
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -47,7 +48,7 @@ class Explorer:
         self._pages: dict[str, queue.SimpleQueue[Answer]] = {}
         self._last_seen = float("inf")  # nobody was there yet
         try:
-            self._server = ThreadingHTTPServer((LOOPBACK, port), _handler(self))
+            self._server = ThreadingHTTPServer((LOOPBACK, port), partial(_Handler, self))
         except OSError as error:
             text = f"--port {port}: nothing can listen there: {error.strerror}; give another port, or none"
             raise InputError(text) from error
@@ -105,99 +106,102 @@ class Explorer:
         )
 
 
-def _handler(explorer: Explorer) -> type[BaseHTTPRequestHandler]:
-    class Handler(BaseHTTPRequestHandler):
-        protocol_version = "HTTP/1.1"
+class _Handler(BaseHTTPRequestHandler):
+    """One request of a browser, answered by the explorer that the address' token belongs to."""
 
-        def do_GET(self) -> None:
-            name = self._authorised_path()
-            if name is None:
-                return
-            name, _, page = name.partition("?page=")
-            if name == "events" and page:
-                self._events(page)
-            elif name == "beginning":
-                self._send(
-                    HTTPStatus.OK, json.dumps(explorer.beginning).encode(), "application/json"
-                )
-            elif (file := name or PAGE) in FILES:
-                self._send(HTTPStatus.OK, content_of(file), FILES[file])
-            else:
-                self._refuse(HTTPStatus.NOT_FOUND)
+    protocol_version = "HTTP/1.1"
 
-        def do_POST(self) -> None:
-            name = self._authorised_path()
-            if name is None:
-                return
-            length = self.headers.get("Content-Length", "")
-            if name != "ask" or not length.isdecimal() or int(length) > _MOST_BYTES:
-                self._refuse(HTTPStatus.BAD_REQUEST)
-                return
-            try:
-                question = json.loads(self.rfile.read(int(length)))
-                page, question["number"] = str(question["page"]), float(question["number"])
-            except (ValueError, KeyError, TypeError, RecursionError):
-                self._refuse(HTTPStatus.BAD_REQUEST)
-                return
-            found = explorer.answer(page, question)
-            self._send(HTTPStatus.OK, json.dumps(found).encode(), "application/json")
+    def __init__(self, explorer: Explorer, *connection: Any) -> None:
+        self._explorer = explorer
+        super().__init__(*connection)  # which answers
 
-        def _authorised_path(self) -> str | None:
-            """Return what is asked for behind the token; None where it is refused."""
-            _, token, *rest = (*self.path.split("/", 2), "")[:3]
-            known = secrets.compare_digest(token.encode(), explorer.token.encode())
-            origin = self.headers.get("Origin")
-            ours = origin is None or origin in [f"http://{host}" for host in explorer.hosts]
-            if not known or self.headers.get("Host") not in explorer.hosts or not ours:
-                self._refuse(HTTPStatus.FORBIDDEN)
-                return None
-            return rest[0]
+    def do_GET(self) -> None:
+        name = self._authorised_path()
+        if name is None:
+            return
+        name, _, page = name.partition("?page=")
+        if name == "events" and page:
+            self._events(page)
+        elif name == "beginning":
+            self._send(
+                HTTPStatus.OK, json.dumps(self._explorer.beginning).encode(), "application/json"
+            )
+        elif (file := name or PAGE) in FILES:
+            self._send(HTTPStatus.OK, content_of(file), FILES[file])
+        else:
+            self._refuse(HTTPStatus.NOT_FOUND)
 
-        def _events(self, page: str) -> None:
-            """Tell a page what comes up, for as long as it is open."""
-            told = explorer.opened(page)
-            try:
-                self._head(HTTPStatus.OK, "text/event-stream", None)
-                while True:
-                    try:
-                        text = f"data: {json.dumps(told.get(timeout=_BEAT))}\n\n"
-                    except queue.Empty:
-                        text = ": still here\n\n"
-                    self.wfile.write(text.encode())
-                    self.wfile.flush()
-            except OSError:
-                self.close_connection = True
-            finally:
-                explorer.close_page(page, told)
+    def do_POST(self) -> None:
+        name = self._authorised_path()
+        if name is None:
+            return
+        length = self.headers.get("Content-Length", "")
+        if name != "ask" or not length.isdecimal() or int(length) > _MOST_BYTES:
+            self._refuse(HTTPStatus.BAD_REQUEST)
+            return
+        try:
+            question = json.loads(self.rfile.read(int(length)))
+            page, question["number"] = str(question["page"]), float(question["number"])
+        except (ValueError, KeyError, TypeError, RecursionError):
+            self._refuse(HTTPStatus.BAD_REQUEST)
+            return
+        found = self._explorer.answer(page, question)
+        self._send(HTTPStatus.OK, json.dumps(found).encode(), "application/json")
 
-        def _head(self, status: HTTPStatus, kind: str, length: int | None) -> None:
-            self.send_response(status)
-            self.send_header("Content-Type", kind)
-            if length is None:
-                self.send_header("Connection", "close")
-            else:
-                self.send_header("Content-Length", str(length))
-            self.send_header("Cache-Control", "no-store")
-            self.send_header("Content-Security-Policy", _POLICY)
-            self.send_header("Referrer-Policy", "no-referrer")
-            self.send_header("X-Content-Type-Options", "nosniff")
-            self.end_headers()
+    def _authorised_path(self) -> str | None:
+        """Return what is asked for behind the token; None where it is refused."""
+        _, token, *rest = (*self.path.split("/", 2), "")[:3]
+        known = secrets.compare_digest(token.encode(), self._explorer.token.encode())
+        origin = self.headers.get("Origin")
+        ours = origin is None or origin in [f"http://{host}" for host in self._explorer.hosts]
+        if not known or self.headers.get("Host") not in self._explorer.hosts or not ours:
+            self._refuse(HTTPStatus.FORBIDDEN)
+            return None
+        return rest[0]
 
-        def _send(self, status: HTTPStatus, content: bytes, kind: str) -> None:
-            try:
-                self._head(status, kind, len(content))
-                self.wfile.write(content)
-            except OSError:  # the page was closed meanwhile
-                self.close_connection = True
-
-        def _refuse(self, status: HTTPStatus) -> None:
+    def _events(self, page: str) -> None:
+        """Tell a page what comes up, for as long as it is open."""
+        told = self._explorer.opened(page)
+        try:
+            self._head(HTTPStatus.OK, "text/event-stream", None)
+            while True:
+                try:
+                    text = f"data: {json.dumps(told.get(timeout=_BEAT))}\n\n"
+                except queue.Empty:
+                    text = ": still here\n\n"
+                self.wfile.write(text.encode())
+                self.wfile.flush()
+        except OSError:
             self.close_connection = True
-            self._send(status, status.phrase.encode(), "text/plain")
+        finally:
+            self._explorer.close_page(page, told)
 
-        def version_string(self) -> str:
-            return "gfor"
+    def _head(self, status: HTTPStatus, kind: str, length: int | None) -> None:
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        if length is None:
+            self.send_header("Connection", "close")
+        else:
+            self.send_header("Content-Length", str(length))
+        self.send_header("Cache-Control", "no-store")
+        self.send_header("Content-Security-Policy", _POLICY)
+        self.send_header("Referrer-Policy", "no-referrer")
+        self.send_header("X-Content-Type-Options", "nosniff")
+        self.end_headers()
 
-        def log_message(self, format: str, *args: Any) -> None:
-            """Say nothing: standard error is for what is wrong."""
+    def _send(self, status: HTTPStatus, content: bytes, kind: str) -> None:
+        try:
+            self._head(status, kind, len(content))
+            self.wfile.write(content)
+        except OSError:  # the page was closed meanwhile
+            self.close_connection = True
 
-    return Handler
+    def _refuse(self, status: HTTPStatus) -> None:
+        self.close_connection = True
+        self._send(status, status.phrase.encode(), "text/plain")
+
+    def version_string(self) -> str:
+        return "gfor"
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Say nothing: standard error is for what is wrong."""

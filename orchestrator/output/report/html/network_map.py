@@ -36,41 +36,54 @@ def network_map(
         for a, b in branches
     ]
     for (a, b), part in flows.items():
-        (xa, ya), (xb, yb) = at[a], at[b]
-        mid, along = (
-            np.array([xa + xb, ya + yb]) / 2,
-            np.array([xb - xa, yb - ya]) / (np.hypot(xb - xa, yb - ya) or 1),
-        )
-        size, across = 5 + 7 * part, np.array([-along[1], along[0]])
-        corners = (
-            mid + size * along,
-            mid - size * (along - 0.6 * across),
-            mid - size * (along + 0.6 * across),
-        )
-        points = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners)
-        parts.append(
-            f'<path stroke="#c33" stroke-width="{1 + 5 * part:.1f}" d="M{xa:.1f} {ya:.1f}L{xb:.1f} {yb:.1f}"/>'
-        )
-        parts.append(
-            f'<polygon class="tip" points="{points}" fill="#c33" data-tip="{escape(f"{a} → {b}: {part:.0%}")}"/>'
-        )
-    for bus, (x, y) in at.items():
+        parts += _arrow(at[a], at[b], part, f"{a} → {b}: {part:.0%}")
+    for bus, place in at.items():
         share = min(max(heat[bus], 0.0), 1.0)
-        colour = f"rgb({255 - 40 * share:.0f},{240 - 190 * share:.0f},{220 - 180 * share:.0f})"
-        parts.append(
-            f'<circle class="tip" cx="{x:.1f}" cy="{y:.1f}" r="{6 + 7 * share:.1f}" fill="{colour}" stroke="#555" '
-            f'data-tip="{escape(texts[bus])}"/>'
-        )
+        parts.append(_circle(place, share, texts[bus]))
         if len(buses) <= _LABELS:
-            side = -1 if x > WIDTH - _LABEL else 1
-            anchor = ' text-anchor="end"' if side < 0 else ""
-            parts.append(
-                f'<text x="{x + side * (8 + 6 * share):.1f}" y="{y - 6:.1f}"{anchor}>{escape(labels(bus))}</text>'
-            )
+            parts.append(_label(place, share, labels(bus)))
     height = _MARGIN + max((y for _, y in at.values()), default=HEIGHT - _MARGIN)
     return (
         f'<svg class="chart" viewBox="0 0 {WIDTH} {height:.0f}" role="img" aria-label="{escape(name)}">'
         f"{''.join(parts)}</svg>"
+    )
+
+
+def _arrow(begin: Sequence[float], end: Sequence[float], part: float, text: str) -> tuple[str, str]:
+    """A line as wide as what flows along it, and its head in the middle."""
+    (xa, ya), (xb, yb) = begin, end
+    mid = np.array([xa + xb, ya + yb]) / 2
+    along = np.array([xb - xa, yb - ya]) / (np.hypot(xb - xa, yb - ya) or 1)
+    size, across = 5 + 7 * part, np.array([-along[1], along[0]])
+    corners = (
+        mid + size * along,
+        mid - size * (along - 0.6 * across),
+        mid - size * (along + 0.6 * across),
+    )
+    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners)
+    return (
+        f'<path stroke="#c33" stroke-width="{1 + 5 * part:.1f}" d="M{xa:.1f} {ya:.1f}L{xb:.1f} {yb:.1f}"/>',
+        f'<polygon class="tip" points="{points}" fill="#c33" data-tip="{escape(text)}"/>',
+    )
+
+
+def _circle(place: Sequence[float], share: float, text: str) -> str:
+    """A bus, larger and redder with its share of the largest heat."""
+    x, y = place
+    colour = f"rgb({255 - 40 * share:.0f},{240 - 190 * share:.0f},{220 - 180 * share:.0f})"
+    return (
+        f'<circle class="tip" cx="{x:.1f}" cy="{y:.1f}" r="{6 + 7 * share:.1f}" fill="{colour}" stroke="#555" '
+        f'data-tip="{escape(text)}"/>'
+    )
+
+
+def _label(place: Sequence[float], share: float, text: str) -> str:
+    """A bus's name on the side where it has room."""
+    x, y = place
+    side = -1 if x > WIDTH - _LABEL else 1
+    anchor = ' text-anchor="end"' if side < 0 else ""
+    return (
+        f'<text x="{x + side * (8 + 6 * share):.1f}" y="{y - 6:.1f}"{anchor}>{escape(text)}</text>'
     )
 
 
