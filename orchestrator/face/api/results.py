@@ -49,6 +49,8 @@ class Modes(NoTruth, ask=".stability.stable, or len() for the number of modes in
     ----------
     result
         All that was computed.
+    named
+        The modes that the case gives a name; one that no mode bears is an error that says why.
 
     Examples
     --------
@@ -70,17 +72,12 @@ class Modes(NoTruth, ask=".stability.stable, or len() for the number of modes in
     def __init__(self, result: ModesResult) -> None:
         if not hasattr(result, "prepared"):
             raise InputError(f"Modes({result!r}): modes come from load(…).scenario(…).modes()")
-        self.result = result
+        self.result, self.named = result, NamedModes(result)
 
     @property
     def stability(self) -> Stability:
         """The verdict over the whole spectrum."""
         return self.result.stability
-
-    @property
-    def named(self) -> NamedModes:
-        """The modes that the case gives a name; one that no mode bears is an error that says why."""
-        return NamedModes(self.result)
 
     @property
     def warnings(self) -> tuple[str, ...]:
