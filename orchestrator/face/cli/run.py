@@ -4,6 +4,7 @@ import argparse
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -112,74 +113,25 @@ def _run_all(
     engine: Federates | None,
 ) -> int:
     """Run the scenarios; each is written as soon as it is done."""
-    require_room([scenario.prepared for scenario in scenarios], folder, csv=options.csv)
-    mend(folder)
-    read_manifest(folder)  # one that is somebody else's is refused
-    check_free(folder, files_of_study(scenarios[0].prepared.case))
-    for scenario in scenarios:
-        require_results(folder / scenario.name)
-    if options.resume is None:
-        _say_unfinished(folder)
+    _prepare_folder(scenarios, folder, options)
     names = scenarios[0].prepared.names
     console = terminal.make_console(stderr=options.json, names=names)
     kept = checkpoints.StudyCheckpoints(
         [scenario.prepared for scenario in scenarios], folder, options
     )
-    run_id = kept.run
-    alone = engine is not None or not (
-        options.workers or all(all_ours(one.prepared) for one in scenarios)
-    )
-    workers = 1 if alone else number_of_workers(options.workers, len(scenarios))
+    workers = _number_of_workers(scenarios, options, engine)
     if options.threads is None and workers > 1 and workers >= number_of_cores():
         options.threads = 1  # each core has its scenario
-    results: list[RunResult] = []
-    stopped: dict[str, BaseException] = {}
-
-    def work(index: int, report: Report) -> Outcome:
-        report(0, 0)
-        place = ScenarioFolder(folder, scenarios[index].name, run_id)
-        try:
-            result = _run_into(place, scenarios[index], Progress(report), kept, options, engine)
-            if isinstance(result.failure, ResultsError):
-                place.discard()
-            else:
-                save_run(result, place, csv=options.csv)
-                # it is read again from the disk
-                result.dataset = result.dataset if workers == 1 else xr.Dataset()
-        except (CosimError, KeyboardInterrupt) as error:
-            place.discard()
-            return error
-        return result
-
-    for index, outcome in _outcomes(scenarios, work, console, workers):
-        if isinstance(outcome, BaseException):
-            stopped[scenarios[index].name] = outcome
-            continue
-        if workers > 1 and not isinstance(outcome.failure, ResultsError):
-            outcome.dataset = open_whole(folder / scenarios[index].name / TRAJECTORY)
-        results.append(outcome)
-        terminal.print_warnings([outcome.modes])
-        terminal.print_findings([outcome])
-        if outcome.failure:
-            stopped[scenarios[index].name] = outcome.failure
+    runs = _Runs(scenarios, folder, options, engine=engine, kept=kept, workers=workers)
+    for index, outcome in _outcomes(scenarios, runs.run_one, console, workers):
+        runs.take(scenarios[index].name, outcome)
+    results, stopped = runs.results, runs.stopped
     if stopped and not results:
         error = next(iter(stopped.values()))
         if isinstance(error, CosimError):
             kept.end(whole=False)
         raise error
-    early_end = _early_end(stopped, scenarios, results) if stopped else None
-    said = [*beside.sentences_beside([r.modes for r in results])]
-    plots = _save_together(results, said, folder, run_id, stopped, early_end)
-    if options.json:
-        terminal.print_json([summary_of(r) for r in results])
-    else:
-        print_run(console, results, said, early_end, details=options.details)
-        written = "trajectories (.nc, .csv)" if options.csv else "trajectories (.nc)"
-        words = (
-            f"Results in {folder}: {written}, modes.csv, participation.csv, mode_shapes.csv, "
-            f"step_size.csv, summary.json, {', '.join(p.name for p in plots)}"
-        )
-        console.print(escape(words), soft_wrap=True)
+    runs.save_and_show(console)
     if stopped:
         code = _end(stopped, folder)
         kept.end(whole=False, interrupted=code == INTERRUPTED)
@@ -188,6 +140,95 @@ def _run_all(
     kept.end(whole=True)
     unsound = options.fail_unstable and not all(of_run(r).good for r in results)
     return int(unsound) or exit_code(options, [r.modes.stability for r in results])
+
+
+def _prepare_folder(
+    scenarios: Sequence[Scenario], folder: Path, options: argparse.Namespace
+) -> None:
+    """Refuse a folder that has no room, or that holds what is somebody else's; say which runs in it did not end."""
+    require_room([scenario.prepared for scenario in scenarios], folder, csv=options.csv)
+    mend(folder)
+    read_manifest(folder)  # one that is somebody else's is refused
+    check_free(folder, files_of_study(scenarios[0].prepared.case))
+    for scenario in scenarios:
+        require_results(folder / scenario.name)
+    if options.resume is None:
+        _say_unfinished(folder)
+
+
+def _number_of_workers(
+    scenarios: Sequence[Scenario], options: argparse.Namespace, engine: Federates | None
+) -> int:
+    """Scenarios that run side by side: foreign FMUs do so if they are asked to, and federates never."""
+    alone = engine is not None or not (
+        options.workers or all(all_ours(one.prepared) for one in scenarios)
+    )
+    return 1 if alone else number_of_workers(options.workers, len(scenarios))
+
+
+@dataclass
+class _Runs:
+    """The scenarios of a command, and what came of those that were begun.
+
+    ``results``: of all that made steps, in their order.
+    ``stopped``: what ended a scenario before its time, by the scenario's name."""
+
+    scenarios: Sequence[Scenario]
+    folder: Path
+    options: argparse.Namespace
+    engine: Federates | None
+    kept: checkpoints.StudyCheckpoints
+    workers: int
+    results: list[RunResult] = field(default_factory=list)
+    stopped: dict[str, BaseException] = field(default_factory=dict)
+
+    def run_one(self, index: int, report: Report) -> Outcome:
+        """Run a scenario and write what it gives; an error that ends it is the outcome."""
+        report(0, 0)
+        scenario, options = self.scenarios[index], self.options
+        place = ScenarioFolder(self.folder, scenario.name, self.kept.run)
+        try:
+            result = _run_into(place, scenario, Progress(report), self.kept, options, self.engine)
+            if isinstance(result.failure, ResultsError):
+                place.discard()
+            else:
+                save_run(result, place, csv=options.csv)
+                # it is read again from the disk
+                result.dataset = result.dataset if self.workers == 1 else xr.Dataset()
+        except (CosimError, KeyboardInterrupt) as error:
+            place.discard()
+            return error
+        return result
+
+    def take(self, name: str, outcome: Outcome) -> None:
+        """Take what came of a scenario, and tell its warnings and findings."""
+        if isinstance(outcome, BaseException):
+            self.stopped[name] = outcome
+            return
+        if self.workers > 1 and not isinstance(outcome.failure, ResultsError):
+            outcome.dataset = open_whole(self.folder / name / TRAJECTORY)
+        self.results.append(outcome)
+        terminal.print_warnings([outcome.modes])
+        terminal.print_findings([outcome])
+        if outcome.failure:
+            self.stopped[name] = outcome.failure
+
+    def save_and_show(self, console: Console) -> None:
+        """Write the files that are of all scenarios together, and print the results."""
+        results, options = self.results, self.options
+        early_end = _early_end(self.stopped, self.scenarios, results) if self.stopped else None
+        said = [*beside.sentences_beside([r.modes for r in results])]
+        plots = _save_together(results, said, self.folder, self.kept.run, self.stopped, early_end)
+        if options.json:
+            terminal.print_json([summary_of(r) for r in results])
+            return
+        print_run(console, results, said, early_end, details=options.details)
+        written = "trajectories (.nc, .csv)" if options.csv else "trajectories (.nc)"
+        words = (
+            f"Results in {self.folder}: {written}, modes.csv, participation.csv, mode_shapes.csv, "
+            f"step_size.csv, summary.json, {', '.join(p.name for p in plots)}"
+        )
+        console.print(escape(words), soft_wrap=True)
 
 
 def _outcomes(

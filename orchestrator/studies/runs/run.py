@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -179,10 +179,7 @@ def _run(
     boxes: Callable[..., ModesResult] | None,
     engine: Engine | None = None,
 ) -> RunResult:
-    obstacle_of = obstacle if engine is None else _with_obstacles(engine)
     watch = Watch(prepared, recording)
-    statistics = None
-    failure: CosimError | None = None
     after = modes_after(prepared, frequency_range)
     relays = relays_in(prepared)
     guards = [relays] if prepared.relays else []
@@ -190,73 +187,25 @@ def _run(
         protections = {
             name: found for name, c in master.components.items() if (found := protections_of(c))
         }
-        reasons = [text for c in master.components.values() if (text := obstacle_of(c))]
-        if reasons and boxes is not None:
-            modes = boxes(prepared, master, frequency_range)
-        elif reasons:
-            misfits, modes = misfits_of(master), unknown_modes(prepared, reasons)
-            started = (
-                *sentences(misfits),
-                *start_warnings(master),
-                *limiter_warnings(master),
-                *motor_warnings(master),
-            )
-            modes = replace(modes, warnings=(*started, *modes.warnings), misfits=misfits)
-        else:
-            modes = modes_of(prepared, master, frequency_range)
-        if reasons and not (
-            boxes or engine
-        ):  # a look is in steps, which a foreign federate cannot take back
-            modes = replace(modes, warnings=(*modes.warnings, *_diverging(master)))
+        modes = _modes_at_start(prepared, master, frequency_range, boxes, engine)
         shifts = _shifts(master, modes)
         follows = _response_of(master, prepared) if linear else None
-        try:
-            if engine is not None:
-                engine.begin(master)
-            statistics = master.run(
-                prepared.stop_time,
-                prepared.events,
-                [*watch.observers, *guards, *observers],
-                checkpoints or NOT_KEPT,
-            )
-        except NotTakenUpError:
-            raise
-        except CosimError as error:
-            failure = error
-        except KeyboardInterrupt:
-            failure = RunInterruptedError(f"{calls.how} at t = {master.time:.6g} s")
+        watching: list[Observer] = [*watch.observers, *guards, *observers]
+        statistics, failure = _run_to_its_end(master, prepared, watching, checkpoints, engine)
     trips = relays.trips
     if trips:
         prepared = with_trips(prepared, trips)
         modes, after = replace(modes, prepared=prepared), modes_after(prepared, frequency_range)
     dataset, failure = _recorded(watch, prepared, recording, failure)
-    known, later = (
-        () if not isinstance(r, ModesResult) or r.fit_errors else r.eigenvalues
-        for r in (modes, after)
-    )
+    known, later = _exact_eigenvalues(modes), _exact_eigenvalues(after)
     findings = watch.findings(failure, master.late_starts, modes.misfits, known, later, trips=trips)
     ring_down, why_none = (None, "") if failure else ring_down_of(modes, dataset, findings, after)
-    unprotected = tuple(
-        f"{name} runs in a process of its own, and this system lacks: {'; '.join(lacking)}"
-        for name, found in protections.items()
-        if (lacking := missing(found))
-    )
-    inside = tuple(
-        (
-            f"component {name!r} runs in gfor's own process, because the case and "
-            + Option.TRUST_FMUS
-            + " say so"
-        )
-        for name, plan in prepared.system.components.items()
-        if plan.isolated is False and is_isolated(plan.description, None)
-    )
     not_known = [after] if isinstance(after, str) else []
     about_run = (
         *map(str, prepared.about_rows),
         *filter(None, [why_none]),
         *not_known,
-        *unprotected,
-        *inside,
+        *_isolation_warnings(prepared, protections),
     )
     modes = replace(modes, warnings=(*modes.warnings, *about_run))
     return RunResult(
@@ -272,6 +221,81 @@ def _run(
         after=after,
         trips=trips,
     )
+
+
+def _modes_at_start(
+    prepared: PreparedScenario,
+    master: Master,
+    frequency_range: tuple[float, float],
+    boxes: Callable[..., ModesResult] | None,
+    engine: Engine | None,
+) -> ModesResult:
+    """The modes, or why there are none: a component cannot be linearised, and nothing identifies it."""
+    obstacle_of = obstacle if engine is None else _with_obstacles(engine)
+    reasons = [text for c in master.components.values() if (text := obstacle_of(c))]
+    if not reasons:
+        return modes_of(prepared, master, frequency_range)
+    if boxes is not None:
+        return boxes(prepared, master, frequency_range)
+    misfits, modes = misfits_of(master), unknown_modes(prepared, reasons)
+    # a look is in steps, which a foreign federate cannot take back
+    diverging = _diverging(master) if engine is None else []
+    warnings = (
+        *sentences(misfits),
+        *start_warnings(master),
+        *limiter_warnings(master),
+        *motor_warnings(master),
+        *modes.warnings,
+        *diverging,
+    )
+    return replace(modes, warnings=warnings, misfits=misfits)
+
+
+def _run_to_its_end(
+    master: Master,
+    prepared: PreparedScenario,
+    observers: Sequence[Observer],
+    checkpoints: Checkpoints | None,
+    engine: Engine | None,
+) -> tuple[StepStatistics | None, CosimError | None]:
+    """Return the statistics of the steps, or what ended them before their time."""
+    try:
+        if engine is not None:
+            engine.begin(master)
+        statistics = master.run(
+            prepared.stop_time, prepared.events, observers, checkpoints or NOT_KEPT
+        )
+    except NotTakenUpError:
+        raise
+    except CosimError as error:
+        return None, error
+    except KeyboardInterrupt:
+        return None, RunInterruptedError(f"{calls.how} at t = {master.time:.6g} s")
+    return statistics, None
+
+
+def _exact_eigenvalues(modes: ModesResult | str | None) -> Sequence[complex]:
+    """Eigenvalues [rad/s] of which none rests on a fit; none where there are no others."""
+    return () if not isinstance(modes, ModesResult) or modes.fit_errors else modes.eigenvalues
+
+
+def _isolation_warnings(
+    prepared: PreparedScenario, protections: Mapping[str, tuple[Protection, ...]]
+) -> list[str]:
+    """Foreign FMUs that this system cannot keep from all of the machine, and those that run in gfor's own process."""
+    unprotected = [
+        f"{name} runs in a process of its own, and this system lacks: {'; '.join(lacking)}"
+        for name, found in protections.items()
+        if (lacking := missing(found))
+    ]
+    inside = [
+        f"component {name!r} runs in gfor's own process, because the case and "
+        + Option.TRUST_FMUS
+        + " say so"
+        for name, plan in prepared.system.components.items()
+        if plan.isolated is False and is_isolated(plan.description, None)
+    ]
+    return unprotected + inside
 
 
 def with_trips(prepared: PreparedScenario, trips: Sequence[Trip]) -> PreparedScenario:
