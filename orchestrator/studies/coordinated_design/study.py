@@ -341,29 +341,87 @@ def design_over_points(
     ]
     space = SettingSpace(plan.groups, plan.request.gain_bounds, frequency)
     search = SettingSearch(space, rated)
-    found = search.best()
-    wanted, compared = plan.request.damping, 0
-    if wanted is not None and not (found.worth.allowed and found.worth.worst >= wanted + _SPARE):
-        stage("grid of settings, as the search did not reach what is wanted")
-        found, compared = search.over_grid(found)
-    found = search.without_idle(found, None if wanted is None else wanted + _SPARE)
-    reached = wanted is not None and found.worth.allowed and found.worth.worst >= wanted + _SPARE
-    thin = None
-    if wanted is not None and reached:
-        found = search.with_least_gain(found, wanted + _SPARE)
-        more = search.tried(found.x * np.tile([1.0, 1.0, MORE], len(plan.groups))).worth
-        thin = None if more.worst >= wanted and more.allowed else more.worst
-    settings = tuple(space.group_settings(found.x))
+    best = _search(search, plan, stage)
+    settings, setting = tuple(space.group_settings(best.tried.x)), space.setting(best.tried.x)
     stage("operating points with the controllers")
     then = replace(work, report=lambda n, of: work.report(of + n, 2 * of))
     after = modes_at(plan, values_of(plan.groups, settings), (), then)
-    after = with_followed_names(plan.aim.names, before, after, space.setting(found.x))
+    after = with_followed_names(plan.aim.names, before, after, setting)
     stage("ranking")
+    places = [place for group in plan.groups for place in group.places]
+    known = None
+    if len(places) == 1 and not best.reached:  # the least gain is not the best
+        known = _KnownDesign(places[0], settings[0], after)
+    ranking = _ranking(plan, rated, frequency, before, known, work)
+    predicted = {
+        point.number: worth_of_all(point.loops, setting, plan.aim, point.apart) for point in rated
+    }
+    where = [plan.read.of(item) for item in plan.read.items]
+    points = judge_points(where, before, after, plan.aim, predicted, _apart(rated), setting=setting)
+    return PointsDesign(
+        plan,
+        frequency,
+        settings=settings,
+        found=best.tried,
+        points=tuple(points),
+        ranking=ranking,
+        evaluations=search.evaluations,
+        compared=best.compared,
+        thin=best.thin,
+    )
+
+
+@dataclass(frozen=True)
+class _BestSettings:
+    """The best settings on the linear models; ``compared`` and ``thin`` as `PointsDesign` has them."""
+
+    tried: Tried
+    compared: int
+    reached: bool  # whether they give the damping that is wanted
+    thin: float | None = None
+
+
+def _search(
+    search: SettingSearch, plan: PointsDesignPlan, stage: Callable[[str], None]
+) -> _BestSettings:
+    """Search for the best settings, and where they give more than is wanted, for the least gain that suffices."""
+    wanted, tried, compared = plan.request.damping, search.best(), 0
+    if wanted is None:
+        return _BestSettings(search.without_idle(tried, None), compared, reached=False)
+    enough = wanted + _SPARE
+    if not (tried.worth.allowed and tried.worth.worst >= enough):
+        stage("grid of settings, as the search did not reach what is wanted")
+        tried, compared = search.over_grid(tried)
+    tried = search.without_idle(tried, enough)
+    if not (tried.worth.allowed and tried.worth.worst >= enough):
+        return _BestSettings(tried, compared, reached=False)
+    tried = search.with_least_gain(tried, enough)
+    more = search.tried(tried.x * np.tile([1.0, 1.0, MORE], len(plan.groups))).worth
+    thin = None if more.worst >= wanted and more.allowed else more.worst
+    return _BestSettings(tried, compared, reached=True, thin=thin)
+
+
+@dataclass(frozen=True)
+class _KnownDesign:
+    """The best setting of a controller alone where the design itself is one, with the modes that it gives."""
+
+    place: PodPlace
+    setting: PodSetting
+    points: Sequence[PointModes]
+
+
+def _ranking(
+    plan: PointsDesignPlan,
+    rated: Sequence[RatedPoint],
+    frequency: float,
+    before: Sequence[PointModes],
+    known: _KnownDesign | None,
+    work: Work,
+) -> tuple[RankedConverter, ...]:
+    """The converters by what a controller there alone would give, computed anew with the setting of each."""
+    largest = plan.request.gain_bounds[1]
     every = dict.fromkeys(plan.candidates, largest)
     alike = [RatedPoint(point.number, point.loops, plan.aim, every) for point in rated]
-    places = [place for group in plan.groups for place in group.places]
-    # the least gain is not the best
-    designed = (places[0], settings[0]) if len(places) == 1 and not reached else None
     alone = ranked(
         plan.candidates,
         _stages(plan),
@@ -371,42 +429,12 @@ def design_over_points(
         largest=largest,
         frequency=frequency,
         most=plan.request.ranked,
-        known=designed,
+        known=None if known is None else (known.place, known.setting),
     )
-    known = {designed[0]: after} if designed else {}
-    quietly = replace(work, report=nobody)
-    ranking = best_first(
-        [
-            _confirmed(plan, one, before, known.get(one.place), _apart(alike), quietly)
-            for one in alone
-        ]
-    )
-    predicted = {
-        point.number: worth_of_all(point.loops, space.setting(found.x), plan.aim, point.apart)
-        for point in rated
-    }
-    where = [plan.read.of(item) for item in plan.read.items]
-    points = tuple(
-        judge_points(
-            where,
-            before,
-            after,
-            plan.aim,
-            predicted,
-            _apart(rated),
-            setting=space.setting(found.x),
-        )
-    )
-    return PointsDesign(
-        plan,
-        frequency,
-        settings=settings,
-        found=found,
-        points=points,
-        ranking=ranking,
-        evaluations=search.evaluations,
-        compared=compared,
-        thin=thin,
+    computed = {} if known is None else {known.place: known.points}
+    apart, quietly = _apart(alike), replace(work, report=nobody)
+    return best_first(
+        [_confirmed(plan, one, before, computed.get(one.place), apart, quietly) for one in alone]
     )
 
 

@@ -5,7 +5,7 @@ The sensitivities are finite differences between two real linearisations, and th
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import KW_ONLY, MISSING, dataclass, replace
+from dataclasses import KW_ONLY, MISSING, dataclass, field, replace
 from typing import Any
 
 from orchestrator.cases.case import Case
@@ -377,31 +377,67 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
     initial = off.eigenvalue
     required = _required(request, initial)
     predicted = leads.predicted_mode(required, initial)
-
-    def around(placed: Placed) -> Surroundings:
-        return surroundings(loop.model(placed.setting), placed.eigenvalue, start.naming)
-
-    judged: dict[PodSetting, Judgement] = {}
-
-    def judge(placed: Placed) -> Judgement:
-        if placed.setting not in judged:
-            after = around(placed)
-            damping = damping_ratio(after.counting(placed.eigenvalue))
-            least = min(
-                [damping_ratio(placed.eigenvalue), *(mode.damping_ratio for mode in after.others)]
-            )
-            judged[placed.setting] = Judgement(
-                damping, breach(before, after, request.least_damping), least
-            )
-        return judged[placed.setting]
-
-    def settings() -> Sequence[tuple[str, PodSetting]]:
-        report("refinement: a search and a grid of settings on the linear model")
-        return start.search(
-            start.prepared.case, request, start.target, start.mode_name, loop, initial.imag
-        )
-
     report("sensitivity of the mode")
+    equations = _solve_equations(start, loop, predicted)
+    report("closed loop with the design")
+    designed = loop.place(off, equations.gain, equations.filters)
+    judge = _Judge(start, loop)
+    choice = _choose(judge, designed, equations.filters, required, report)
+    final = choice.final
+    examined = loop.examine(final.setting)
+    growth = growth_of(
+        loop,
+        final.setting,
+        examined.stability,
+        request.bounds(search=choice.refinement is not None),
+    )
+    margins = spoilt = None
+    if request.margins and final.setting.gain and examined.stability.stable is not False:
+        margins = compute_margins(loop, off, final, request.least_damping, report)
+        with suppress(AnalysisError):  # the mode cannot be followed
+            more = loop.place(off, (1 + VARIATION) * final.setting.gain, final.setting.filters)
+            spoilt = judge.breach_in(judge.around(more))
+    return PodDesign(
+        request=request,
+        case=start.case,
+        target=start.target,
+        prepared=start.prepared,
+        mode_name=start.mode_name,
+        initial=initial,
+        required_damping=required,
+        predicted=predicted,
+        sensitivities=equations.sensitivities,
+        filters=equations.filters,
+        gain_non_compensated=equations.gain_non_compensated,
+        gain_compensated=equations.gain_compensated,
+        gain=equations.gain,
+        designed=designed,
+        refinement=choice.refinement,
+        other_gain=choice.other_gain,
+        final=final,
+        before=before,
+        after=choice.after,
+        broken=choice.broken or _unstable(examined.stability, growth),
+        margins=margins,
+        spoilt=spoilt,
+        examined_before=start.examined,
+        examined=examined,
+    )
+
+
+@dataclass(frozen=True)
+class _Equations:
+    """Lead/lag and gain by the paper's equations, from the sensitivity of the mode; gains as `PodDesign` has them."""
+
+    sensitivities: GainSensitivities
+    filters: leads.LeadLag
+    gain_non_compensated: float
+    gain_compensated: float
+    gain: float
+
+
+def _solve_equations(start: _Start, loop: PodLoop, predicted: complex) -> _Equations:
+    request, off, initial = start.request, start.off, start.off.eigenvalue
     bare = loop.place(off, request.delta_gain)
     S = leads.sensitivity(bare.eigenvalue, initial, request.delta_gain)
     angle = leads.angle_deg(S)
@@ -412,76 +448,115 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
         raise AnalysisError(f"{error}{typed and f'. Or {typed}'}") from error
     turned = loop.place(off, request.delta_gain, filters)
     S_turned = leads.sensitivity(turned.eigenvalue, initial, request.delta_gain)
-    gains = [leads.required_gain(predicted, initial, abs(value)) for value in (S, S_turned)]
-    gain = leads.bounded(gains[request.compensated_gain], request.bounds(search=False))
-
-    report("closed loop with the design")
-    final = designed = loop.place(off, gain, filters)
-    refinement, after = None, around(designed)
-    short = damping_ratio(after.counting(designed.eigenvalue)) < required - _MET
-    broken = breach(before, after, request.least_damping)
-    if request.refine or ((short or broken) and request.gain_bounds is None):
-        bounds, evenly = request.bounds(search=True), request.mode is None
-        refinement = refine(
-            loop,
-            off,
-            filters=filters,
-            required=required,
-            bounds=bounds,
-            judge=judge,
-            search=settings,
-            evenly=evenly,
-            report=report,
-        )
-        final = refinement.chosen or designed
-        after = around(final)
-        broken = breach(before, after, request.least_damping)
-    other_gain = None
-    if refinement is None and short:
-        report("other gains")
-        with suppress(AnalysisError):  # the mode cannot be followed
-            other_gain = sweep(
-                loop, off, filters, required, request.bounds(search=False), "as designed"
-            ).chosen
-    if other_gain is not None:
-        there, now = judge(other_gain), judge(designed)
-        if there.damping > now.damping + _MET and not (there.broken and not now.broken):
-            final, after, broken = other_gain, around(other_gain), there.broken
-    examined = loop.examine(final.setting)
-    growth = growth_of(
-        loop, final.setting, examined.stability, request.bounds(search=refinement is not None)
+    non_compensated = leads.required_gain(predicted, initial, abs(S))
+    compensated = leads.required_gain(predicted, initial, abs(S_turned))
+    unbounded = compensated if request.compensated_gain else non_compensated
+    return _Equations(
+        GainSensitivities(bare.eigenvalue, S, S_turned),
+        filters,
+        non_compensated,
+        compensated,
+        gain=leads.bounded(unbounded, request.bounds(search=False)),
     )
-    margins = spoilt = None
-    if request.margins and final.setting.gain and examined.stability.stable is not False:
-        margins = compute_margins(loop, off, final, request.least_damping, report)
-        with suppress(AnalysisError):  # the mode cannot be followed
-            more = loop.place(off, (1 + VARIATION) * final.setting.gain, final.setting.filters)
-            spoilt = breach(before, around(more), request.least_damping)
-    return PodDesign(
-        request=request,
-        case=start.case,
-        target=start.target,
-        prepared=start.prepared,
-        mode_name=start.mode_name,
-        initial=initial,
-        required_damping=required,
-        predicted=predicted,
-        sensitivities=GainSensitivities(bare.eigenvalue, S, S_turned),
+
+
+@dataclass(frozen=True)
+class _Judge:
+    """Judges settings on the closed loop, each of them once."""
+
+    start: _Start
+    loop: PodLoop
+    judged: dict[PodSetting, Judgement] = field(default_factory=dict)
+
+    def around(self, placed: Placed) -> Surroundings:
+        """The other modes of the closed loop with a setting."""
+        model = self.loop.model(placed.setting)
+        return surroundings(model, placed.eigenvalue, self.start.naming)
+
+    def breach_in(self, after: Surroundings) -> str | None:
+        return breach(self.start.before, after, self.start.request.least_damping)
+
+    def judgement(self, placed: Placed) -> Judgement:
+        if placed.setting not in self.judged:
+            after = self.around(placed)
+            damping = damping_ratio(after.counting(placed.eigenvalue))
+            least = min(
+                [damping_ratio(placed.eigenvalue), *(mode.damping_ratio for mode in after.others)]
+            )
+            self.judged[placed.setting] = Judgement(damping, self.breach_in(after), least)
+        return self.judged[placed.setting]
+
+
+@dataclass(frozen=True)
+class _Choice:
+    """The final setting with the closed loop around it, and the searches that led to it, as `PodDesign` has them."""
+
+    final: Placed
+    after: Surroundings
+    broken: str | None
+    refinement: Refinement | None = None
+    other_gain: Placed | None = None
+
+
+def _choose(
+    judge: _Judge,
+    designed: Placed,
+    filters: leads.LeadLag,
+    required: float,
+    report: StageReport,
+) -> _Choice:
+    """The design by the equations, or a better setting where it falls short and one may be searched."""
+    request = judge.start.request
+    after = judge.around(designed)
+    short = damping_ratio(after.counting(designed.eigenvalue)) < required - _MET
+    choice = _Choice(designed, after, judge.breach_in(after))
+    if request.refine or ((short or choice.broken) and request.gain_bounds is None):
+        refinement = _refined(judge, filters, required, report)
+        final = refinement.chosen or designed
+        after = judge.around(final)
+        return _Choice(final, after, judge.breach_in(after), refinement)
+    if not short:
+        return choice
+    report("other gains")
+    other = None
+    with suppress(AnalysisError):  # the mode cannot be followed
+        bounds = request.bounds(search=False)
+        other = sweep(judge.loop, judge.start.off, filters, required, bounds, "as designed").chosen
+    if other is None:
+        return choice
+    there, now = judge.judgement(other), judge.judgement(designed)
+    if there.damping > now.damping + _MET and not (there.broken and not now.broken):
+        return _Choice(other, judge.around(other), there.broken, other_gain=other)
+    return replace(choice, other_gain=other)
+
+
+def _refined(
+    judge: _Judge, filters: leads.LeadLag, required: float, report: StageReport
+) -> Refinement:
+    """The best gain and lead/lag on the closed loop."""
+    start, request = judge.start, judge.start.request
+
+    def settings() -> Sequence[tuple[str, PodSetting]]:
+        report("refinement: a search and a grid of settings on the linear model")
+        return start.search(
+            start.prepared.case,
+            request,
+            start.target,
+            start.mode_name,
+            judge.loop,
+            start.off.eigenvalue.imag,
+        )
+
+    return refine(
+        judge.loop,
+        start.off,
         filters=filters,
-        gain_non_compensated=gains[0],
-        gain_compensated=gains[1],
-        gain=gain,
-        designed=designed,
-        refinement=refinement,
-        other_gain=other_gain,
-        final=final,
-        before=before,
-        after=after,
-        broken=broken or _unstable(examined.stability, growth),
-        margins=margins,
-        spoilt=spoilt,
-        examined_before=start.examined,
-        examined=examined,
+        required=required,
+        bounds=request.bounds(search=True),
+        judge=judge.judgement,
+        search=settings,
+        evenly=request.mode is None,
+        report=report,
     )
 
 
