@@ -208,9 +208,54 @@ class CutResult:
 
 def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) -> CutResult:
     """Bring both sides into one unit and one frame, and judge their loop."""
-    cut, scans, known, unit, lead = None, dict[str, Scan](), True, PER_UNIT, 0.0
+    sides = _sides(request, report)
+    request, cut, scans = sides.request, sides.cut, sides.scans
+    rating = _rating(request, cut)
+    base = _base_of_unit(sides)
+    loop = _loop(sides, rating, base)
+    closed = cut if not scans and not request.compensation and request.scr is None else None
+    judgement = judge_loop(
+        loop, frames_known=sides.frames_known, modes=closed.eigenvalues if closed else NO_MODES
+    )
+    if closed is not None:
+        judgement = beside_modes(judgement, closed)
+    prepared = (
+        request.network
+        if isinstance(request.network, PreparedScenario) and request.scr is None
+        else None
+    )
+    strengths = strengths_of(
+        loop.network, request.frequency, base, prepared, cut.bus if cut else ""
+    )
+    questions = _questions(sides, rating)
+    return CutResult(
+        request, loop, judgement, scans, cut, sides.unit, questions, rating, *strengths
+    )
+
+
+@dataclass(frozen=True)
+class _CutSides:
+    """Both sides of a cut in one unit, as a case or scans give them.
+
+    ``request``: with the rated frequency of the case.
+    ``frames_known``: whether the angle between the sides' frames is stated.
+    ``lead``: what a free angle makes of the loop at rest, as `CutLoop` has it."""
+
+    request: CutRequest
+    cut: Cut | None = None
+    scans: dict[str, Scan] = field(default_factory=dict)
+    frames_known: bool = True
+    unit: str = PER_UNIT
+    lead: float = 0.0
+
+
+def _sides(request: CutRequest, report: Callable[[str], None] | None) -> _CutSides:
+    """Read or measure both sides, and bring scans into one unit and, where it is known, into one frame."""
+    sides = _CutSides(request)
     if isinstance(request.network, PreparedScenario):
-        request, cut, scans, known, lead = _opened(request, request.network)
+        sides = _opened(request, request.network)
+    request, cut, scans = sides.request, sides.cut, sides.scans
+    known, unit = sides.frames_known, PER_UNIT
     if request.device is not None:
         if cut is not None and len(cut.devices) > 1:
             raise InputError(
@@ -229,24 +274,37 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
         scans["device"], known = place_scan(
             scans["device"], cut, cut.devices[0], request.kilovolt, request.angle
         )
-    questions = tuple(q for scan in scans.values() for q in scan.questions) + (
-        cut.warnings if cut else ()
-    )
-    device: Side | None = cut.device if cut else None
-    device = sampled(scans["device"]) if "device" in scans else device
-    rating, kilovolt = _rating(request, cut), request.kilovolt
-    questions += tuple(
+    return replace(sides, scans=scans, frames_known=known, unit=unit)
+
+
+def _questions(sides: _CutSides, rating: float | None) -> tuple[str, ...]:
+    """Doubts of the scans and of the cut, and scans beyond the device's rating."""
+    questions = [q for scan in sides.scans.values() for q in scan.questions]
+    if sides.cut is not None:
+        questions += sides.cut.warnings
+    questions += [
         f"{scan.source} was scanned at {point.megawatt:g} MW, and the device is rated at {rating:g} MVA; do both hold?"
-        for side, scan in scans.items()
+        for side, scan in sides.scans.items()
         for point in scan.points.values()
         if side != "network" and rating and abs(point.megawatt or 0.0) > 1.1 * rating
-    )
-    for scan in scans.values():
-        kilovolt = kilovolt or next(
-            (point.kilovolt for point in scan.points.values() if point.kilovolt), None
-        )
-    of_ohms = kilovolt**2 if kilovolt else None
-    base = SYSTEM_BASE_MVA if unit == PER_UNIT else of_ohms
+    ]
+    return tuple(questions)
+
+
+def _base_of_unit(sides: _CutSides) -> float | None:
+    """The power [MVA] of an impedance of 1; None for ohms where no rated voltage is known."""
+    if sides.unit == PER_UNIT:
+        return SYSTEM_BASE_MVA
+    stated = [point.kilovolt for scan in sides.scans.values() for point in scan.points.values()]
+    kilovolt = sides.request.kilovolt or next(filter(None, stated), None)
+    return kilovolt**2 if kilovolt else None
+
+
+def _loop(sides: _CutSides, rating: float | None, base: float | None) -> CutLoop:
+    """The loop of both sides, which must belong together, with the capacitors that are asked for."""
+    request, cut, scans = sides.request, sides.cut, sides.scans
+    device: Side | None = cut.device if cut else None
+    device = sampled(scans["device"]) if "device" in scans else device
     network: Side | None = cut.network if cut else None
     network = sampled(scans["network"], inverse=True) if "network" in scans else network
     if request.scr is not None:
@@ -255,31 +313,17 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
     assert network is not None
     if "network" in scans:
         check_pair(scans["device"], scans["network"])
-    loop = CutLoop(device, network, lead=lead if scans and request.scr is None else 0.0)
+    lead = sides.lead if scans and request.scr is None else 0.0
+    loop = CutLoop(device, network, lead=lead)
     if ("network" in scans or (scans and request.scr)) and not request.units_checked:
         check_size(loop, *common_range(device, network, (0.0, 0.0)))
     if request.compensation:
         loop = replace(loop, capacitors=_capacitors(loop, request))
-    closed = cut if not scans and not request.compensation and request.scr is None else None
-    judgement = judge_loop(
-        loop, frames_known=known, modes=closed.eigenvalues if closed else NO_MODES
-    )
-    if cut is not None and closed:
-        judgement = beside_modes(judgement, cut)
-    prepared = (
-        request.network
-        if isinstance(request.network, PreparedScenario) and request.scr is None
-        else None
-    )
-    strengths = strengths_of(network, request.frequency, base, prepared, cut.bus if cut else "")
-    return CutResult(request, loop, judgement, scans, cut, unit, questions, rating, *strengths)
+    return loop
 
 
-def _opened(
-    request: CutRequest, case: PreparedScenario
-) -> tuple[CutRequest, Cut, dict[str, Scan], bool, float]:
-    """The case cut where it is asked for, or at its scans; those, whether their frames are known, and the lead of what
-    a free angle makes of the loop."""
+def _opened(request: CutRequest, case: PreparedScenario) -> _CutSides:
+    """The case cut where it is asked for, or at its scans."""
     held, scans, sure = scans_in(case), dict[str, Scan](), [True]
     cut = cut_of(case, request.bus, request.components or (() if request.bus else tuple(held)))
     if held and set(cut.devices) != set(held):
@@ -299,13 +343,9 @@ def _opened(
         )
         sure.append(known)
     lead = CutLoop(cut.device, cut.network).lead_at_rest
-    return (
-        request,
-        replace(cut, device=at_ports(scans, cut)) if held else cut,
-        scans,
-        all(sure),
-        lead,
-    )
+    if held:
+        cut = replace(cut, device=at_ports(scans, cut))
+    return _CutSides(request, cut, scans, frames_known=all(sure), lead=lead)
 
 
 def _read(request: CutRequest, side: str, path: Path) -> Scan:
