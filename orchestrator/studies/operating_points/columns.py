@@ -55,6 +55,9 @@ class Elements:
         branches = [*(line.name for line in network.lines), *(x.name for x in network.transformers)]
         wanted = table.slack or prepared.source_slack or ""
 
+        balancing = prepared.power_flow.balancing if prepared.power_flow else ()
+        ends = {line.name: (line.from_bus, line.to_bus) for line in network.lines}
+
         def with_switch(names: Iterable[str]) -> tuple[str, ...]:
             return tuple(name for name in names if f"{name}.connected" in switches)
 
@@ -65,10 +68,10 @@ class Elements:
             loads=tuple(load.name for load in network.loads),
             shunts=with_switch(shunt.name for shunt in network.shunts),
             slack=units.get(wanted, wanted),
-            balancing=prepared.power_flow.balancing if prepared.power_flow else (),
+            balancing=balancing,
             step_ups=own_branches(network, units),
             file=prepared.names,
-            ends={line.name: (line.from_bus, line.to_bus) for line in network.lines},
+            ends=ends,
             other_ends=_other_ends(prepared, units),
             of_phasors=prepared.system.components[table.grid].is_of_phasors,
         )

@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from fmus.grid.network import Network
 from orchestrator.cases.flow.connected import connected_parts
 from orchestrator.cases.form.names import close_names
 from orchestrator.cases.scenario.prepare import PreparedScenario
@@ -103,72 +104,110 @@ class Remains:
 
 def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[str]) -> Remains:
     """Return what outages leave: of all parts with a unit in service, the one with the most load remains."""
-    network, grid = prepared.network, prepared.system.components[elements.grid]
-    assert network is not None
-    values = grid.parameters
-    opened_ends = [end for end in map(LineEnd.of, out) if end is not None]
-    out = tuple(map(line_of, out))
-    branches = [(x.name, x.from_bus, x.to_bus) for x in network.lines]
-    branches += [(x.name, x.buses[0], bus) for x in network.transformers for bus in x.buses[1:]]
-    part = connected_parts(
-        network.buses, [(a, b) for name, a, b in branches if _closed(name, out, values)]
-    )
-    power = {
-        x.name: grid.number(f"{x.name}.scale") * grid.number(f"{x.name}.P") for x in network.loads
-    }
-    units = [name for name in elements.units if _closed(name, out, values)]
-    rating = {name: prepared.system.components[name].number("S_n") for name in units}
-    fed = {part[elements.units[name]] for name in units}
-    out_units = tuple(name for name in elements.units if name in out)
+    parts = _Parts.of(prepared, elements, tuple(map(line_of, out)))
+    of_bus, network = parts.of_bus, parts.network
+    fed = {of_bus[bus] for bus in parts.units.values()}
     if not fed:
         return Remains("no unit is left, so no system remains")
-    weight = {
-        k: (
-            sum(power[x.name] for x in network.loads if part[x.bus] == k and x.name not in out),
-            sum(rating[name] for name in units if part[elements.units[name]] == k),
-        )
-        for k in fed
-    }
-    main = max(weight, key=lambda k: weight[k])
-    dead = [bus for bus in network.buses if part[bus] != main]
-    for k in fed - {main}:
-        load, power_there = weight[k]
-        if load > _AUXILIARY * power_there:
-            names = ", ".join(name for name in units if part[elements.units[name]] == k)
-            buses = few((bus for bus in dead if part[bus] == k), _SHOWN)
-            return Remains(
-                f"{buses} cut off, with {load:.4g} MW of load and the units {names}, which may go on alone"
-            )
-    lost = [x for x in branches if x[0] in out and bool(values.get(f"{x[0]}.connected", True))]
-    ties, joined = _ties(lost, part)
-    if any(joined[part[bus]] != joined[main] for bus in dead):
+    main = max(fed, key=lambda part: (parts.load_in(part), parts.rating_in(part)))
+    dead = [bus for bus in network.buses if of_bus[bus] != main]
+    for part in fed - {main}:
+        if parts.load_in(part) > _AUXILIARY * parts.rating_in(part):
+            return Remains(parts.island_sentence(part, dead))
+    ties, joined = _ties(parts.lost, of_bus)
+    if any(joined[of_bus[bus]] != joined[main] for bus in dead):
         return Remains(
             f"{few(dead, _SHOWN)} cut off by branches that the case or the point has open"
         )
-    opened = set(out) - set(ties)
-    charged = {end.line for end in opened_ends if end.bus in dead}  # from the bus that remains
+    gone = [name for name in elements.units if name in parts.out]
+    gone += [name for name, bus in parts.units.items() if of_bus[bus] != main]
+    gone += [elements.other_ends[name] for name in gone if name in elements.other_ends]
     loads = tuple(
-        x.name for x in network.loads if x.name in out or (part[x.bus] != main and power[x.name])
+        x.name
+        for x in network.loads
+        if x.name in parts.out or (of_bus[x.bus] != main and parts.loads[x.name])
     )
-    charging = tuple(
-        x.variable("B")
-        for x in network.lines
-        if x.B and x.name not in opened | charged and {x.from_bus, x.to_bus} & set(dead)
+    shunts = tuple(
+        x.name for x in network.shunts if x.name in elements.shunts and of_bus[x.bus] != main
     )
-    gone = [*out_units, *(n for n in units if part[elements.units[n]] != main)]
+    ends = [end for end in map(LineEnd.of, out) if end is not None]
+    charged = {end.line for end in ends if end.bus in dead}  # from the bus that remains
+    open_or_charged = set(parts.out) - set(ties) | charged
     return Remains(
-        units=tuple(
-            dict.fromkeys(
-                (*gone, *(elements.other_ends[n] for n in gone if n in elements.other_ends))
-            )
-        ),
+        units=tuple(dict.fromkeys(gone)),
         loads=loads,
-        shunts=tuple(
-            x.name for x in network.shunts if x.name in elements.shunts and part[x.bus] != main
-        ),
-        charging=charging,
+        shunts=shunts,
+        charging=_charging_of_dead_lines(network, dead, open_or_charged),
         ties=tuple(dict.fromkeys(ties)),
         dead=tuple(dead),
+    )
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """The network in the parts into which outages cut it; each bus has the number of its part."""
+
+    network: Network
+    of_bus: Mapping[str, int]
+    out: tuple[str, ...]  # what is lost, a line of which one end is open among it
+    lost: Sequence[tuple[str, str, str]]  # branches among it that were closed, with two buses each
+    units: Mapping[str, str]  # bus of each unit in service
+    ratings: Mapping[str, float]  # of these units [MVA]
+    loads: Mapping[str, float]  # power of all loads [MW]
+
+    @classmethod
+    def of(cls, prepared: PreparedScenario, elements: Elements, out: tuple[str, ...]) -> "_Parts":
+        network, components = prepared.network, prepared.system.components
+        assert network is not None
+        grid = components[elements.grid]
+        values = grid.parameters
+        branches = [(x.name, x.from_bus, x.to_bus) for x in network.lines]
+        branches += [(x.name, x.buses[0], bus) for x in network.transformers for bus in x.buses[1:]]
+        closed = [(one, other) for name, one, other in branches if _closed(name, out, values)]
+        units = {name: bus for name, bus in elements.units.items() if _closed(name, out, values)}
+        loads = {
+            x.name: grid.number(f"{x.name}.scale") * grid.number(f"{x.name}.P")
+            for x in network.loads
+        }
+        return cls(
+            network,
+            connected_parts(network.buses, closed),
+            out=out,
+            lost=[x for x in branches if x[0] in out and values.get(f"{x[0]}.connected", True)],
+            units=units,
+            ratings={name: components[name].number("S_n") for name in units},
+            loads=loads,
+        )
+
+    def load_in(self, part: int) -> float:
+        """The load in a part [MW], without loads that are lost."""
+        inside = (x.name for x in self.network.loads if self.of_bus[x.bus] == part)
+        return sum(self.loads[name] for name in inside if name not in self.out)
+
+    def units_in(self, part: int) -> list[str]:
+        return [name for name, bus in self.units.items() if self.of_bus[bus] == part]
+
+    def rating_in(self, part: int) -> float:
+        """The ratings of a part's units [MVA]."""
+        return sum(self.ratings[name] for name in self.units_in(part))
+
+    def island_sentence(self, part: int, dead: Sequence[str]) -> str:
+        """Which buses are an island that goes on without those that remain."""
+        buses = few((bus for bus in dead if self.of_bus[bus] == part), _SHOWN)
+        return (
+            f"{buses} cut off, with {self.load_in(part):.4g} MW of load and the units "
+            f"{', '.join(self.units_in(part))}, which may go on alone"
+        )
+
+
+def _charging_of_dead_lines(
+    network: Network, dead: Sequence[str], open_or_charged: set[str]
+) -> tuple[str, ...]:
+    """The grid's variables of the charging of lines that end at a dead bus, and that are closed at both ends."""
+    return tuple(
+        x.variable("B")
+        for x in network.lines
+        if x.B and x.name not in open_or_charged and {x.from_bus, x.to_bus} & set(dead)
     )
 
 

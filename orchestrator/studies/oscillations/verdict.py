@@ -81,40 +81,13 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
     t = signals.times[used]
     periods = len(t) * step * f
     if periods < _FEWEST_PERIODS:
-        return Evidence(
-            "not known",
-            0.0,
-            envelope_spread=0.0,
-            kurtosis=0.0,
-            coherence=0.0,
-            skirt=0.0,
-            periods=periods,
-            disturbed=False,
-            reasons=(
-                f"the record shows it for {periods:.1f} periods, and {_FEWEST_PERIODS} are needed "
-                "to tell a driven oscillation from one that decays",
-            ),
-        )
+        return _too_short(periods)
     seen, envelopes = [], []
     for k in columns:
         z, half = envelope(t, signals.values[used, k], f)
-        size, late = np.abs(z), t[half : len(t) - half]
-        slope, level = np.polyfit(late - late.mean(), np.log(np.maximum(size, 1e-300)), 1)
-        trend = np.exp(level + slope * (late - late.mean()))
-        explained = 1 - float(((size - trend) ** 2).mean() / size.var())
-        change = np.expm1(slope * (late[-1] - late[0])) if explained > _TREND else 0.0
-        wave = np.real(z * np.exp(2j * np.pi * f * late))
-        kurtosis = (wave**4).mean() / (wave**2).mean() ** 2
-        spread = size.std() / size.mean()
+        late = t[half : len(t) - half]
         envelopes.append(z)
-        some = z[:: max(1, len(z) // 64), None]
-        at = np.linspace(0, 1, len(some))
-        pair = (
-            most_explained(at, some, np.arange(-2, 2.01, 0.125), 2)[1]
-            if spread > _RESTLESS
-            else 0.0
-        )
-        seen.append([spread, kurtosis, abs(z.mean()) / size.mean(), slope, change, pair])
+        seen.append(_figures_of_envelope(z, late, f))
     beside = float(np.median([skirt(t, signals.values[used, k], [f]) for k in columns]))
     spread, kurtosis, coherence, slope, change, pair = np.median(seen, axis=0).tolist()
     damping = float(-100 * slope / np.hypot(slope, 2 * np.pi * f))
@@ -136,6 +109,43 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
         other = doubt(kind, late, np.column_stack(envelopes), shown, f)
         kind, reasons = ("not known", [f"{reasons[0]}, but {other}"]) if other else (kind, reasons)
     return replace(figures, kind=kind, reasons=tuple(reasons))
+
+
+def _too_short(periods: float) -> Evidence:
+    return Evidence(
+        "not known",
+        0.0,
+        envelope_spread=0.0,
+        kurtosis=0.0,
+        coherence=0.0,
+        skirt=0.0,
+        periods=periods,
+        disturbed=False,
+        reasons=(
+            f"the record shows it for {periods:.1f} periods, and {_FEWEST_PERIODS} are needed "
+            "to tell a driven oscillation from one that decays",
+        ),
+    )
+
+
+def _figures_of_envelope(z: Numbers, times: Numbers, frequency: float) -> list[float]:
+    """Figures of the complex amplitude z of one signal over the time.
+
+    Spread of its size, kurtosis, coherence; slope of its logarithm [1/s], and the change that an exponential makes of
+    it, 0 if none explains it; the part that two sines at close frequencies explain, 0 if it hardly spreads."""
+    size, after = np.abs(z), times - times.mean()
+    slope, level = np.polyfit(after, np.log(np.maximum(size, 1e-300)), 1)
+    trend = np.exp(level + slope * after)
+    explained = 1 - float(((size - trend) ** 2).mean() / size.var())
+    change = np.expm1(slope * (times[-1] - times[0])) if explained > _TREND else 0.0
+    wave = np.real(z * np.exp(2j * np.pi * frequency * times))
+    kurtosis = (wave**4).mean() / (wave**2).mean() ** 2
+    spread, pair = size.std() / size.mean(), 0.0
+    if spread > _RESTLESS:
+        some = z[:: max(1, len(z) // 64), None]
+        at = np.linspace(0, 1, len(some))
+        _, pair = most_explained(at, some, np.arange(-2, 2.01, 0.125), 2)
+    return [spread, kurtosis, abs(z.mean()) / size.mean(), slope, change, pair]
 
 
 def forced_frequencies(times: Numbers, names: Sequence[str], values: Numbers) -> list[float]:
@@ -246,6 +256,9 @@ class Located:
 
     def as_json(self) -> dict[str, Any]:
         onset = self.found.onset
+        begin, begin_within = None, None
+        if onset is not None:
+            begin, begin_within = onset.at, [onset.earliest, onset.latest]
         return {
             "frequency_hz": self.found.frequency,
             "kind": self.evidence.kind,
@@ -253,14 +266,12 @@ class Located:
             "drives": self.drives,
             "reason": self.reason,
             "advice": self.advice,
-            "begin": None if onset is None else onset.at,
-            "begin_within": None if onset is None else [onset.earliest, onset.latest],
+            "begin": begin,
+            "begin_within": begin_within,
             "harmonics": {str(order): part for order, part in self.found.harmonics.items()},
             "evidence": asdict(self.evidence),
             "controllers": list(self.controllers),
-            "methods": [
-                asdict(o) | {"ranking": [list(one) for one in o.ranking]} for o in self.opinions
-            ],
+            "methods": [asdict(o) | {"ranking": list(map(list, o.ranking))} for o in self.opinions],
             "amplitudes": dict(list(self.found.amplitudes.items())[:_SHOWN]),
         }
 
