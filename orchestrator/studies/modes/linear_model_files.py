@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -55,16 +56,23 @@ def component_model(prepared: PreparedScenario, name: str) -> EmbeddedModel:
             )
         values = master.components[name].get([*c.states, *inputs, *outputs])
         given = {STEP_PARAMETER} if knows_step(master, name) else set()
+
+    def start_of(names: Iterable[str]) -> dict[str, float]:
+        return {name: values[name] for name in names}
+
     columns = [c.inputs.index(v) for v in inputs]
+    derivatives = f"central differences of {PERTURBATIONS[0]:g}"
+    if exact:
+        derivatives = "directional derivatives"
     parameters = {v: x for v, x in plan.parameters.items() if x != info[v].start and v not in given}
     return EmbeddedModel(
         A=c.A_c,
         B=c.B_c[:, columns],
         C=c.C_o,
         D=c.D_o[:, columns],
-        states={v: values[v] for v in c.states},
-        inputs={v: values[v] for v in inputs},
-        outputs={v: values[v] for v in outputs},
+        states=start_of(c.states),
+        inputs=start_of(inputs),
+        outputs=start_of(outputs),
         parameters=parameters,
         units={v: info[v].unit for v in (*c.states, *inputs, *outputs, *parameters)},
         origin={
@@ -73,9 +81,7 @@ def component_model(prepared: PreparedScenario, name: str) -> EmbeddedModel:
             "component": name,
             "step_size_s": prepared.step_size,
             "residual_per_step": point.residual,
-            "derivatives": "directional derivatives"
-            if exact
-            else f"central differences of {PERTURBATIONS[0]:g}",
+            "derivatives": derivatives,
             "fmu_guid": plan.description.guid,
         },
     )

@@ -390,6 +390,25 @@ class Linearised:
         failing = component_faults(
             prepared.case.table.events if own is None else own, prepared.system
         )
+        misfits = [
+            f"{name} does not fit its binding: {misfit.fault}"
+            for name, found in self._misfits.items()
+            for misfit in found
+        ]
+        eigenvalues: Sequence[complex] = ()
+        outside = None
+        if spectrum is not None:
+            eigenvalues = spectrum.eigenvalues.tolist()
+            beyond = [mode for mode in oscillating if not low <= mode.frequency_hz <= high]
+            swings = [mode.eigenvalue for mode in beyond if _is_swing(mode, analysis.swing)]
+            outside = replace(
+                hidden(spectrum.eigenvalues, low, high), electromechanical=tuple(swings)
+            )
+        fit_errors = {
+            name: component.disagreement
+            for name, component in self._blocks.components.items()
+            if component.source == IDENTIFIED
+        }
         return ModesResult(
             prepared=prepared,
             operating_point=self._point,
@@ -407,30 +426,11 @@ class Linearised:
             ),
             swing=tuple(matching(model.names, analysis.swing)),
             areas=areas_of(analysis.areas, prepared.system) or prepared.areas_of_units,
-            stability=examined.stability.doubted(
-                [
-                    f"{name} does not fit its binding: {m.fault}"
-                    for name, found in self._misfits.items()
-                    for m in found
-                ]
-            ),
-            hidden=None
-            if spectrum is None
-            else replace(
-                hidden(spectrum.eigenvalues, low, high),
-                electromechanical=tuple(
-                    mode.eigenvalue
-                    for mode in oscillating
-                    if not low <= mode.frequency_hz <= high and _is_swing(mode, analysis.swing)
-                ),
-            ),
+            stability=examined.stability.doubted(misfits),
+            hidden=outside,
             system=self._system,
-            eigenvalues=() if spectrum is None else spectrum.eigenvalues.tolist(),
-            fit_errors={
-                name: c.disagreement
-                for name, c in self._blocks.components.items()
-                if c.source == IDENTIFIED
-            },
+            eigenvalues=eigenvalues,
+            fit_errors=fit_errors,
             unnamed=naming.reasons,
         )
 
@@ -607,34 +607,37 @@ def named_json(r: ModesResult) -> dict[str, Any]:
 def _whole_json(r: ModesResult) -> dict[str, Any]:
     """Return the same with all modes in the range."""
     named = {table.name: r.named.get(table.name) for table in r.prepared.case.table.analysis.modes}
+    figures = {
+        name: mode and eigenvalue_json(mode.eigenvalue, mode.damping_percent)
+        for name, mode in named.items()
+    }
     return {
         **scenario_json(r),
         "power_flow": power_flow_json(r.prepared),
         "linearised": r.linearised,
         "fit_errors": r.fit_errors,
         "warnings": list(r.warnings),
-        "named": {
-            name: m and eigenvalue_json(m.eigenvalue, m.damping_percent)
-            for name, m in named.items()
-        },
-        "modes": [
-            {
-                **eigenvalue_json(m.eigenvalue, m.damping_percent),
-                "name": r.name_of(m),
-                "participation": [
-                    {"state": s, "factor": f} for s, f in m.participation if f >= 1e-4
-                ],
-                "components": {c: f for c, f in m.by_component.items() if f >= 1e-4},
-                "areas": r.by_area(m),
-                "shape": [
-                    {
-                        "state": s,
-                        "magnitude": abs(m.shape[s]),
-                        "angle_deg": math.degrees(phase(m.shape[s])),
-                    }
-                    for s in r.swing
-                ],
-            }
-            for m in r.modes
-        ],
+        "named": figures,
+        "modes": [_mode_json(r, mode) for mode in r.modes],
+    }
+
+
+def _mode_json(r: ModesResult, mode: spectra.Mode) -> dict[str, Any]:
+    """One mode with who takes part; smaller shares than 0.01 % are left out."""
+    participation = [{"state": s, "factor": f} for s, f in mode.participation if f >= 1e-4]
+    shape = [
+        {
+            "state": state,
+            "magnitude": abs(mode.shape[state]),
+            "angle_deg": math.degrees(phase(mode.shape[state])),
+        }
+        for state in r.swing
+    ]
+    return {
+        **eigenvalue_json(mode.eigenvalue, mode.damping_percent),
+        "name": r.name_of(mode),
+        "participation": participation,
+        "components": {c: f for c, f in mode.by_component.items() if f >= 1e-4},
+        "areas": r.by_area(mode),
+        "shape": shape,
     }

@@ -329,18 +329,19 @@ def step_choice_json(choice: StepChoice) -> dict[str, Any]:
         "continuous_growth_rate": choice.growth,
         "largest_step_s": {name: best and best.step_size for name, best in largest.items()},
         "left_out_s": list(choice.left_out),
-        "trials": [
-            {
-                "schedule": trial.schedule,
-                "step_size_s": trial.step_size,
-                "frequency_error_hz": trial.hertz.tolist(),
-                "damping_error_points": trial.points.tolist(),
-                "growth_rate": None if trial.refused else trial.growth,
-                "stable": None if trial.refused else trial.stable,
-                "within": trial.is_within(choice.allowed),
-                "refused": trial.refused,
-                "doubts": list(trial.doubts),
-            }
-            for trial in choice.trials
-        ],
+        "trials": [_trial_json(trial, choice.allowed) for trial in choice.trials],
+    }
+
+
+def _trial_json(trial: TriedStep, allowed: Allowed) -> dict[str, Any]:
+    return {
+        "schedule": trial.schedule,
+        "step_size_s": trial.step_size,
+        "frequency_error_hz": trial.hertz.tolist(),
+        "damping_error_points": trial.points.tolist(),
+        "growth_rate": None if trial.refused else trial.growth,
+        "stable": None if trial.refused else trial.stable,
+        "within": trial.is_within(allowed),
+        "refused": trial.refused,
+        "doubts": list(trial.doubts),
     }

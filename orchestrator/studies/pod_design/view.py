@@ -141,6 +141,12 @@ def design_json(d: PodDesign) -> dict[str, Any]:
     if not d.target.has_gain_alone:
         T_S1, T_S2 = setting.filters.T_S1, setting.filters.T_S2
         compensation = {"T_S1": T_S1, "T_S2": T_S2, "N_S": d.target.stages}
+    of_margins = {}
+    if d.margins:
+        of_margins = {
+            "thin_margin_damping_ratio": d.thin_margin,
+            "larger_gain_spoils": d.spoilt,
+        }
     return {
         "controller": d.request.controller,
         "target_mode": _complex(d.initial),
@@ -160,11 +166,7 @@ def design_json(d: PodDesign) -> dict[str, Any]:
         "met": d.met,
         "verdict": verdict(d),
         "remarks": remarks(d),
-        **(
-            {"thin_margin_damping_ratio": d.thin_margin, "larger_gain_spoils": d.spoilt}
-            if d.margins
-            else {}
-        ),
+        **of_margins,
         "target_damping_ratio": damping_ratio(d.initial),
         "achieved_damping_ratio": d.achieved_damping,
         "followed_mode": _complex(d.final.eigenvalue),

@@ -32,8 +32,12 @@ from orchestrator.studies.runs.mode_plots import (
 from orchestrator.studies.runs.run import RunResult
 from orchestrator.studies.runs.tables import ring_down_json
 from orchestrator.systems.coupling.events import BusFault, LineFault
+from orchestrator.systems.coupling.statistics import StepStatistics
 
 _TABLES = ("modes.csv", "participation.csv", "mode_shapes.csv")  # of `save_modes`
+_SPEED = ("steps_per_second", "share_in_fmus", "real_time_factor", "threads")
+"""Figures of a summary that the steps' statistics have under the same names."""
+
 _LEAST_PARTICIPATION = 1e-3  # smaller factors are left out of the files
 
 
@@ -188,32 +192,33 @@ def _shift_rows(results: Sequence[RunResult]) -> list[dict[str, Any]]:
 def summary_of(result: RunResult) -> dict[str, Any]:
     """Figures of one scenario: steady state, named modes, references, ring-down, speed, findings, failure."""
     modes = result.modes
-    stats = result.statistics
     # no event has happened that growth would have to wait for
     undecided = result.before_its_events and modes.stability.stable is not False
+    stable = None if undecided else modes.stability.stable
+    swing = {name: modes.swing_of(mode) for name, mode in modes.named.items()}
+    events = modes.prepared.events
+    bus_faults = [e.bus for e in events if isinstance(e, BusFault) and e.on]
+    line_faults = [e.line for e in events if isinstance(e, LineFault) and e.on]
+    failure = str(result.failure) if result.failure else None
+    isolated = {name: list(map(asdict, found)) for name, found in result.protections.items()}
     return {
         "name": modes.prepared.name,
         "title": modes.prepared.title,
         **scenario_json(modes),
-        "stable": None if undecided else modes.stability.stable,
+        "stable": stable,
         **named_json(modes),
         **ring_down_json(result),
-        "steps_per_second": stats.steps_per_second if stats else None,
-        "share_in_fmus": stats.share_in_fmus if stats else None,
-        "real_time_factor": stats.real_time_factor if stats else None,
-        "threads": stats.threads if stats else None,
+        **_speed(result.statistics),
         "linear_difference": _linear_differences(result),
-        "swing": {name: modes.swing_of(mode) for name, mode in modes.named.items()},
+        "swing": swing,
         "step_size_s": modes.prepared.step_size,
         "stop_time": modes.prepared.stop_time,
         "schedule": modes.prepared.schedule.name,
         "tolerance": modes.prepared.schedule.tolerance,
-        "adaptive_steps": None
-        if stats is None or stats.adaptive is None
-        else asdict(stats.adaptive),
-        "events": [str(event) for event in modes.prepared.events],
-        "bus_faults": [e.bus for e in modes.prepared.events if isinstance(e, BusFault) and e.on],
-        "line_faults": [e.line for e in modes.prepared.events if isinstance(e, LineFault) and e.on],
+        "adaptive_steps": _adaptive_steps(result.statistics),
+        "events": list(map(str, events)),
+        "bus_faults": bus_faults,
+        "line_faults": line_faults,
         "sequences": [fault.as_json() for fault in modes.prepared.faults],
         "answer": of_run(result).as_json(),
         "power_flow": _power_flow(modes.prepared),
@@ -222,12 +227,23 @@ def summary_of(result: RunResult) -> dict[str, Any]:
         "warnings": list(modes.warnings),
         "stable_in_simulation": result.stable_in_simulation,
         "findings": [finding.as_json() for finding in result.findings],
-        "failure": str(result.failure) if result.failure else None,
+        "failure": failure,
         "interrupted": isinstance(result.failure, RunInterruptedError),
-        "isolated": {
-            name: [asdict(p) for p in found] for name, found in result.protections.items()
-        },
+        "isolated": isolated,
     }
+
+
+def _speed(statistics: StepStatistics | None) -> dict[str, Any]:
+    """How fast the run was; each figure is None where it made no steps."""
+    if statistics is None:
+        return dict.fromkeys(_SPEED)
+    return {figure: getattr(statistics, figure) for figure in _SPEED}
+
+
+def _adaptive_steps(statistics: StepStatistics | None) -> dict[str, Any] | None:
+    if statistics is None or statistics.adaptive is None:
+        return None
+    return asdict(statistics.adaptive)
 
 
 def _power_flow(prepared: PreparedScenario) -> dict[str, Any] | None:

@@ -137,13 +137,15 @@ def draw_eigenvalues(
     }
     for index, result in enumerate(results, start=first):
         modes = shown[id(result)]
+        sizes = [70 if result.name_of(m) else 30 for m in modes]
+        widths = [2.0 if result.name_of(m) else 1.0 for m in modes]
         axis.scatter(
             [m.eigenvalue.real for m in modes],
             [m.frequency_hz * turn for m in modes],
             marker="x",
             # the legend takes its mark from here
-            s=[70 if result.name_of(m) else 30 for m in modes] or 30,
-            linewidths=[2.0 if result.name_of(m) else 1.0 for m in modes] or 1.0,
+            s=sizes or 30,
+            linewidths=widths or 1.0,
             color=colour(index),
             label=result.label,
             zorder=3,

@@ -20,19 +20,22 @@ from orchestrator.studies.runs.run import RunResult
 
 def steady_states(results: Sequence[ModesResult]) -> Table:
     columns = ("Scenario", "States", "Residual per step", "Drift [1/s]", "Power-flow residual [pu]")
-    rows = [
-        (
-            r.prepared.title,
-            str(r.model.number_of_states),
-            *(
-                "–" if math.isnan(v) else f"{v:.1e}"
-                for v in (r.operating_point.residual, r.operating_point.drift)
-            ),
-            f"{r.prepared.power_flow.residual:.1e}" if r.prepared.power_flow else "–",
-        )
-        for r in results
-    ]
-    return make_table("Steady state", *columns, rows=rows)
+    return make_table("Steady state", *columns, rows=map(_steady_cells, results))
+
+
+def _steady_cells(r: ModesResult) -> tuple[str, ...]:
+    flow = r.prepared.power_flow
+    return (
+        r.prepared.title,
+        str(r.model.number_of_states),
+        _residual_cell(r.operating_point.residual),
+        _residual_cell(r.operating_point.drift),
+        _residual_cell(math.nan if flow is None else flow.residual),
+    )
+
+
+def _residual_cell(value: float) -> str:
+    return "–" if math.isnan(value) else f"{value:.1e}"
 
 
 def named_modes(results: Sequence[ModesResult], reference: str | None) -> ShownTable:

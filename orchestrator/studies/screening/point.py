@@ -190,12 +190,11 @@ class _Worker:
             if self._runs is not None and item.lost and result.record.status is Status.COMPUTED:
                 result.record = self._with_run(item, result.record, self._runs)
         intact = [k for k, item in enumerate(items) if item.intact and results[k].found is not None]
-        first = results[0].found
         last = results[intact[-1]].found if intact else None
         return StretchRecord(
             tuple(result.record for result in results),
-            None if first is None else _as_kept(first.modes),
-            None if last is None else _as_kept(last.modes),
+            _as_kept(results[0].found),
+            _as_kept(last),
             intact[-1] if intact else 0,
             self._bench.perturbed,
             self._bench.reused,
@@ -347,8 +346,11 @@ def _reference(items: list[Item], results: list[_Result], k: int) -> int | None:
     return choice[-1] if choice else None
 
 
-def _as_kept(modes: ModeSet) -> ModeSet:
-    """With vectors of half the size, by which stretches are joined."""
+def _as_kept(found: FoundModes | None) -> ModeSet | None:
+    """Modes with vectors of half the size, by which stretches are joined."""
+    if found is None:
+        return None
+    modes = found.modes
     return replace(
         modes, left=modes.left.astype(np.complex64), right=modes.right.astype(np.complex64)
     )

@@ -197,6 +197,7 @@ def _cells(summary: Summary) -> Cells:
             least.frequency,
         )
 
+    cells = [[cell(of.get((name, point.name))) for point in plan.points] for name in outages]
     return Cells(
         f"Least damping of {plan.case.table.title or plan.case.name}: outages, worst first, by operating points",
         plan.case,
@@ -204,7 +205,7 @@ def _cells(summary: Summary) -> Cells:
         frequencies=(plan.wanted.lowest_hz, plan.wanted.highest_hz),
         rows=[CellLine(name, out=taken[name]) for name in outages],
         columns=[CellLine(one.name, one.values, out=one.out) for one in plan.points],
-        cells=[[cell(of.get((name, point.name))) for point in plan.points] for name in outages],
+        cells=cells,
         values=joined_values(plan.layers),
         step=plan.tasks[0].study.step_size,
         sharing=plan.tasks[0].sharing,
@@ -413,6 +414,11 @@ def remarks(summary: Summary) -> list[str]:
 
 def as_json(summary: Summary) -> dict[str, Any]:
     result = summary.result
+    free = [_where(item) | {"zero_eigenvalues": item.record.zeros} for item in summary.free]
+    failures = [
+        _where(item) | {"status": str(item.record.status), "why": item.record.text}
+        for item in summary.failures()
+    ]
     return {
         **result.plan.prepared.about,
         "points": len(result.plan.points),
@@ -423,32 +429,28 @@ def as_json(summary: Summary) -> dict[str, Any]:
         "stable": summary.stable,
         "counted_at_all_frequencies": summary.counted_items,
         "slowest_growth_counted": summary.slowest,
-        "nothing_restores": [
-            _where(item) | {"zero_eigenvalues": item.record.zeros} for item in summary.free
-        ],
+        "nothing_restores": free,
         "counts": {str(status): number for status, number in summary.counts.items()},
         "beyond_rating": summary.beyond or None,
         "limits": limits_json(summary),
         "runs": runs_json(summary),
-        "unstable": [_where(item) for item in summary.unstable],
-        "failures": [
-            _where(item) | {"status": str(item.record.status), "why": item.record.text}
-            for item in summary.failures()
-        ],
-        "modes": [
-            {
-                "name": mode.name,
-                "worst": _where(mode.worst.item)
-                | eigenvalue_json(mode.worst.value, mode.worst.damping),
-                "participation": dict(mode.worst.participation()),
-                "items": len(mode.at),
-                "hours": mode.hours,
-                "converters": [
-                    {"component": name, "residue_p": abs(p), "residue_q": abs(q)}
-                    for name, p, q in mode.worst.ranking()
-                ],
-            }
-            for mode in summary.modes
+        "unstable": list(map(_where, summary.unstable)),
+        "failures": failures,
+        "modes": list(map(_mode_json, summary.modes)),
+    }
+
+
+def _mode_json(mode: ScreenedMode) -> dict[str, Any]:
+    worst = mode.worst
+    return {
+        "name": mode.name,
+        "worst": _where(worst.item) | eigenvalue_json(worst.value, worst.damping),
+        "participation": dict(worst.participation()),
+        "items": len(mode.at),
+        "hours": mode.hours,
+        "converters": [
+            {"component": name, "residue_p": abs(p), "residue_q": abs(q)}
+            for name, p, q in worst.ranking()
         ],
     }
 

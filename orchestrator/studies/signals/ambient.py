@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -83,30 +83,27 @@ class AmbientModes:
             said += f", first {m.frequency_hz:.3f} Hz with {m.damping_percent:.1f} % from {w.start:g} to {w.stop:g} s"
         return said
 
+    def _mode_json(self, row: Mapping[Any, Any], mode: AmbientMode) -> dict[str, Any]:
+        """One mode of a window, whose figures stand in its row of the table."""
+        named = zip(self.signals, mode.shape, strict=True)
+        shape = {name: [z.real, z.imag] for name, z in named}
+        return {key: row[key] for key in _FIGURES} | {"alarm": row["alarm"], "shape": shape}
+
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor signal identify --ambient --json`` prints, as JSON's types."""
         rows = self.table().to_dict("records")
-        windows = [
-            {
-                "start": w.start,
-                "stop": w.stop,
-                "failure": w.failure,
-                "modes": [
-                    {key: row[key] for key in _FIGURES}
-                    | {
-                        "alarm": row["alarm"],
-                        "shape": {
-                            name: [z.real, z.imag]
-                            for name, z in zip(self.signals, m.shape, strict=True)
-                        },
-                    }
-                    for row, m in zip(
-                        [r for r in rows if r["start"] == w.start], w.modes, strict=True
-                    )
-                ],
-            }
-            for w in self.windows
-        ]
+        windows = []
+        for window in self.windows:
+            of_window = [row for row in rows if row["start"] == window.start]
+            modes = zip(of_window, window.modes, strict=True)
+            windows.append(
+                {
+                    "start": window.start,
+                    "stop": window.stop,
+                    "failure": window.failure,
+                    "modes": [self._mode_json(row, mode) for row, mode in modes],
+                }
+            )
         return {
             "record": self.label,
             "signals": self.signals,

@@ -287,6 +287,7 @@ def _unit_in_keys(result: SiteResult) -> str:
 
 def as_json(result: SiteResult) -> dict[str, Any]:
     here, stable = result.intact.name, [at.found.stability.stable for at in result.situations]
+    ranked_by = "damping with the device, by coupled FMUs" if result.by_coupled else unit(result)
     return {
         **result.prepared.about,
         "device": result.request.device,
@@ -301,9 +302,7 @@ def as_json(result: SiteResult) -> dict[str, Any]:
         "remarks": remarks(result),
         "open_points": open_points(result),
         "agrees": result.agrees,
-        "ranked_by": "damping with the device, by coupled FMUs"
-        if result.by_coupled
-        else unit(result),
+        "ranked_by": ranked_by,
         "terminals_left_out": list(result.terminals),
         "stable": all_true(stable),
         "warnings": list(result.intact.found.warnings),
@@ -312,7 +311,7 @@ def as_json(result: SiteResult) -> dict[str, Any]:
         "buses": [_bus_json(result, bus, k + 1) for k, bus in enumerate(result.ranking)],
         "outages": [_outage_json(result, at) for at in result.worst_first if at.name != here],
         "not_judged": dict(result.not_judged),
-        "confirmed": [confirmation_json(one) for one in result.confirmations],
+        "confirmed": list(map(confirmation_json, result.confirmations)),
     }
 
 

@@ -322,33 +322,36 @@ def sweep_json(samples: Samples) -> dict[str, Any]:
             "refining": result.refined,
         },
         "scenarios": [
-            {
-                "name": sweep.prepared.name,
-                "title": sweep.prepared.title,
-                "stable": sweep.stable,
-                "unstable": [
-                    {"values": samples.setting(place)} | sweep.points[place].stability
-                    for place in sweep.unstable(samples.axes)
-                ],
-                "trajectories": [
-                    {
-                        "name": trajectory.name,
-                        "points": [
-                            _point_json(samples.setting(p), f)
-                            for p, f in samples.of(sweep, trajectory)
-                        ],
-                    }
-                    for trajectory in sweep.trajectories
-                ],
-                "failed": failed[sweep.prepared.name],
-                "warnings": [
-                    {"values": samples.setting(place), "warnings": list(said)}
-                    for place in grid_places(samples.axes)
-                    if (said := sweep.points[place].warnings)
-                ],
-            }
+            _scenario_json(samples, sweep, failed[sweep.prepared.name])
             for sweep in result.scenarios
         ],
+    }
+
+
+def _scenario_json(
+    samples: Samples, sweep: ScenarioSweep, failed: list[dict[str, Any]]
+) -> dict[str, Any]:
+    unstable = [
+        {"values": samples.setting(place)} | sweep.points[place].stability
+        for place in sweep.unstable(samples.axes)
+    ]
+    trajectories = []
+    for trajectory in sweep.trajectories:
+        points = [_point_json(samples.setting(p), f) for p, f in samples.of(sweep, trajectory)]
+        trajectories.append({"name": trajectory.name, "points": points})
+    warnings = [
+        {"values": samples.setting(place), "warnings": list(sweep.points[place].warnings)}
+        for place in grid_places(samples.axes)
+        if sweep.points[place].warnings
+    ]
+    return {
+        "name": sweep.prepared.name,
+        "title": sweep.prepared.title,
+        "stable": sweep.stable,
+        "unstable": unstable,
+        "trajectories": trajectories,
+        "failed": failed,
+        "warnings": warnings,
     }
 
 

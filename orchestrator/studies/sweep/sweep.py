@@ -292,17 +292,6 @@ def _limit(result: SweepResult, sweep: ScenarioSweep, work: Work) -> ParameterLi
         }
         for k, record in enumerate(grid)
     ]
-    within = sweep.points[(0,)].overloads
-    strained = next(
-        (
-            (float(_value_at(axis, place[0])), over)
-            for place, record in sorted(sweep.points.items(), key=lambda x: x[0])
-            if holds is not None
-            and place[0] <= holds
-            and (over := tuple(n for n in record.overloads if n not in within))
-        ),
-        None,
-    )
     why = shown.error or (str(shown.stability.get("reason", "")) if end is Ending.NOT_KNOWN else "")
     return ParameterLimit(
         axis.key,
@@ -319,8 +308,22 @@ def _limit(result: SweepResult, sweep: ScenarioSweep, work: Work) -> ParameterLi
         again=tuple(float(axis.values[k]) for k in again),
         why=why,
         worst_at=float(axis.values[worst]),
-        strained=strained,
+        strained=None if holds is None else _first_overloads(sweep, axis, holds),
     )
+
+
+def _first_overloads(
+    sweep: ScenarioSweep, axis: Axis, holds: float
+) -> tuple[float, tuple[str, ...]] | None:
+    """The first value, up to the limit, at which units feed more than their rating, and these units.
+
+    Those that do so at the axis' first value already are left out."""
+    within = sweep.points[(0,)].overloads
+    for place in sorted(sweep.points):
+        beyond = tuple(name for name in sweep.points[place].overloads if name not in within)
+        if beyond and place[0] <= holds:
+            return float(_value_at(axis, place[0])), beyond
+    return None
 
 
 def _margin(record: PointRecord) -> float:

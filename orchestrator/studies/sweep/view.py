@@ -152,14 +152,16 @@ class ParameterSweep(NoTruth):
             return CellLine(", ".join([*words, *who, mode]), values, scenario)
 
         axis = plan.axes[last]
+        columns = [CellLine(f"{value:g}", axis.sets(value)) for value in axis.values]
+        cells = [[row.get(k) for k in range(len(axis.values))] for row in rows.values()]
         return Cells(
             f"Damping of followed modes over {axis.key} [{axis.unit or 1}]",
             plan.case,
             scenario=plan.scenarios[0].name,
             frequencies=plan.frequency_range,
             rows=[side(*key) for key in rows],
-            columns=[CellLine(f"{value:g}", axis.sets(value)) for value in axis.values],
-            cells=[[row.get(k) for k in range(len(axis.values))] for row in rows.values()],
+            columns=columns,
+            cells=cells,
             values=plan.overrides,
             step=plan.step_size,
             followed=True,

@@ -51,15 +51,16 @@ def criteria_table(
     title: str, criteria: Sequence[Criterion], *, by_device: bool = False
 ) -> ShownTable:
     """Figures beside their limits; ``by_device``: whether a device's name stands beside that of the recording."""
-    rows = [
-        (
-            one.place if by_device else one.recording,
-            one.name,
-            "–" if one.value is None else f"{one.value:.4g} {one.unit}",
-            f"{one.limit:g} {one.unit}",
-            str(one.verdict),
-        )
-        for one in criteria
-    ]
+    rows = [_criterion_cells(one, by_device=by_device) for one in criteria]
     headings = ("Recording", "Figure", "Value", "Limit", "Verdict")
     return ShownTable(title, headings, rows, left=2)
+
+
+def _criterion_cells(criterion: Criterion, *, by_device: bool) -> tuple[str, ...]:
+    return (
+        criterion.place if by_device else criterion.recording,
+        criterion.name,
+        "–" if criterion.value is None else f"{criterion.value:.4g} {criterion.unit}",
+        f"{criterion.limit:g} {criterion.unit}",
+        str(criterion.verdict),
+    )
