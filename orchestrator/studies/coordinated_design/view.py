@@ -332,9 +332,11 @@ def ranking_table(design: PointsDesign) -> ColumnTable[RankedConverter]:
         return lambda figure: "–" if figure == "" else f"{figure:{form}}"
 
     names = design.plan.request.modes
-    of_wanted, of_all = "least damping [%]", ""
+    of_wanted = "least damping [%]"
+    of_all = ""
     if names or any(one.worst != one.least for one in design.ranking):
-        of_wanted, of_all = "of the modes that any moves [%]", "of all modes [%]"
+        of_wanted = "of the modes that any moves [%]"
+        of_all = "of all modes [%]"
     if names:
         of_wanted = f"of {', '.join(names)} [%]"
 

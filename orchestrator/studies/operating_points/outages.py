@@ -4,7 +4,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from fmus.grid.network import Network
 from orchestrator.cases.flow.connected import connected_parts
 from orchestrator.cases.form.names import close_names
 from orchestrator.cases.scenario.prepare import PreparedScenario
@@ -104,8 +103,10 @@ class Remains:
 
 def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[str]) -> Remains:
     """Return what outages leave: of all parts with a unit in service, the one with the most load remains."""
+    network = prepared.network
+    assert network is not None
     parts = _Parts.of(prepared, elements, tuple(map(line_of, out)))
-    of_bus, network = parts.of_bus, parts.network
+    of_bus = parts.of_bus
     fed = {of_bus[bus] for bus in parts.units.values()}
     if not fed:
         return Remains("no unit is left, so no system remains")
@@ -123,9 +124,9 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
     gone += [name for name, bus in parts.units.items() if of_bus[bus] != main]
     gone += [elements.other_ends[name] for name in gone if name in elements.other_ends]
     loads = tuple(
-        x.name
-        for x in network.loads
-        if x.name in parts.out or (of_bus[x.bus] != main and parts.loads[x.name])
+        name
+        for name, bus in parts.loads.items()
+        if name in parts.out or (of_bus[bus] != main and parts.powers[name])
     )
     shunts = tuple(
         x.name for x in network.shunts if x.name in elements.shunts and of_bus[x.bus] != main
@@ -133,11 +134,16 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
     ends = [end for end in map(LineEnd.of, out) if end is not None]
     charged = {end.line for end in ends if end.bus in dead}  # from the bus that remains
     open_or_charged = set(parts.out) - set(ties) | charged
+    charging = tuple(
+        x.variable("B")
+        for x in network.lines
+        if x.B and x.name not in open_or_charged and {x.from_bus, x.to_bus} & set(dead)
+    )
     return Remains(
         units=tuple(dict.fromkeys(gone)),
         loads=loads,
         shunts=shunts,
-        charging=_charging_of_dead_lines(network, dead, open_or_charged),
+        charging=charging,
         ties=tuple(dict.fromkeys(ties)),
         dead=tuple(dead),
     )
@@ -147,13 +153,13 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
 class _Parts:
     """The network in the parts into which outages cut it; each bus has the number of its part."""
 
-    network: Network
     of_bus: Mapping[str, int]
     out: tuple[str, ...]  # what is lost, a line of which one end is open among it
     lost: Sequence[tuple[str, str, str]]  # branches among it that were closed, with two buses each
     units: Mapping[str, str]  # bus of each unit in service
     ratings: Mapping[str, float]  # of these units [MVA]
-    loads: Mapping[str, float]  # power of all loads [MW]
+    loads: Mapping[str, str]  # bus of each load
+    powers: Mapping[str, float]  # of all loads [MW]
 
     @classmethod
     def of(cls, prepared: PreparedScenario, elements: Elements, out: tuple[str, ...]) -> "_Parts":
@@ -164,25 +170,30 @@ class _Parts:
         branches = [(x.name, x.from_bus, x.to_bus) for x in network.lines]
         branches += [(x.name, x.buses[0], bus) for x in network.transformers for bus in x.buses[1:]]
         closed = [(one, other) for name, one, other in branches if _closed(name, out, values)]
+        lost = [
+            branch
+            for branch in branches
+            if branch[0] in out and values.get(f"{branch[0]}.connected", True)
+        ]
         units = {name: bus for name, bus in elements.units.items() if _closed(name, out, values)}
-        loads = {
+        powers = {
             x.name: grid.number(f"{x.name}.scale") * grid.number(f"{x.name}.P")
             for x in network.loads
         }
         return cls(
-            network,
             connected_parts(network.buses, closed),
             out=out,
-            lost=[x for x in branches if x[0] in out and values.get(f"{x[0]}.connected", True)],
+            lost=lost,
             units=units,
             ratings={name: components[name].number("S_n") for name in units},
-            loads=loads,
+            loads={x.name: x.bus for x in network.loads},
+            powers=powers,
         )
 
     def load_in(self, part: int) -> float:
         """The load in a part [MW], without loads that are lost."""
-        inside = (x.name for x in self.network.loads if self.of_bus[x.bus] == part)
-        return sum(self.loads[name] for name in inside if name not in self.out)
+        inside = (name for name, bus in self.loads.items() if self.of_bus[bus] == part)
+        return sum(self.powers[name] for name in inside if name not in self.out)
 
     def units_in(self, part: int) -> list[str]:
         return [name for name, bus in self.units.items() if self.of_bus[bus] == part]
@@ -198,17 +209,6 @@ class _Parts:
             f"{buses} cut off, with {self.load_in(part):.4g} MW of load and the units "
             f"{', '.join(self.units_in(part))}, which may go on alone"
         )
-
-
-def _charging_of_dead_lines(
-    network: Network, dead: Sequence[str], open_or_charged: set[str]
-) -> tuple[str, ...]:
-    """The grid's variables of the charging of lines that end at a dead bus, and that are closed at both ends."""
-    return tuple(
-        x.variable("B")
-        for x in network.lines
-        if x.B and x.name not in open_or_charged and {x.from_bus, x.to_bus} & set(dead)
-    )
 
 
 def _ties(

@@ -256,9 +256,8 @@ class Located:
 
     def as_json(self) -> dict[str, Any]:
         onset = self.found.onset
-        begin, begin_within = None, None
-        if onset is not None:
-            begin, begin_within = onset.at, [onset.earliest, onset.latest]
+        begin = None if onset is None else onset.at
+        begin_within = None if onset is None else [onset.earliest, onset.latest]
         return {
             "frequency_hz": self.found.frequency,
             "kind": self.evidence.kind,

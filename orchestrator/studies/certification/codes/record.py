@@ -111,13 +111,11 @@ def row_chapters(c: Certificate, figures: Figures) -> list[tuple[str, str]]:
 
 def _cells_of_finding(v: RowVerdict, f: RowFinding) -> list[str]:
     """One criterion of a row; clause and title of the row stand beside its first one alone."""
-    clause, title = ("", "")
-    if f is v.findings[0]:
-        clause, title = escape(v.row.clause), escape(v.row.title)
+    is_first = f is v.findings[0]
+    of_row = [escape(v.row.clause), escape(v.row.title)] if is_first else ["", ""]
     return [
         escape(v.name),
-        clause,
-        title,
+        *of_row,
         escape(f.criterion),
         escape(f.rule),
         "the code's" if f.origin == "code" else "reading",
