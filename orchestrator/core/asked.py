@@ -4,6 +4,7 @@ A `FieldKind` says twice what a field may be: ``read`` takes the text of an opti
 
 import math
 import re
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import partial
@@ -70,7 +71,7 @@ class Asked:
         )
 
 
-def asked(
+def request_field(
     kind: FieldKind,
     default: Any,
     text: str,
@@ -86,6 +87,18 @@ def asked(
     return field(
         default=default, metadata={_ASKED: (kind, text, metavar or kind.metavar, option, python)}
     )
+
+
+def __getattr__(name: str) -> Any:
+    """Give `request_field` under its former name, which plug-ins may use."""
+    if name != "asked":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warnings.warn(
+        f"{__name__}.asked is now {__name__}.request_field; import that",
+        DeprecationWarning,
+        stacklevel=2,
+    )
+    return request_field
 
 
 def asked_of(request: type) -> dict[str, Asked]:

@@ -10,7 +10,7 @@ import xarray as xr
 
 from orchestrator.cases.form.given import binding_path, plain
 from orchestrator.cases.form.schema import Value
-from orchestrator.core.asked import FILE, FLAG, FieldKind, asked, number_in, one_of, path
+from orchestrator.core.asked import FILE, FLAG, FieldKind, number_in, one_of, path, request_field
 from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
 from orchestrator.core.spelling import Spelling
@@ -159,8 +159,8 @@ class CertifyRequest:
     orchestrator.core.errors.InputError: code = 'misa'; give one of nts631, miso, ...
     """
 
-    fmu: str | Path = asked(FieldKind("", str, path), MISSING, "the converter", option=None)
-    code: str = asked(
+    fmu: str | Path = request_field(FieldKind("", str, path), MISSING, "the converter", option=None)
+    code: str = request_field(
         one_of(WITH_VERDICT),
         NTS631,
         f'``"{NTS631}"``, the damping test, or another that ``gfor certify '
@@ -168,26 +168,26 @@ class CertifyRequest:
         option=None,
     )
     _: KW_ONLY
-    binding: str | Path | None = asked(
+    binding: str | Path | None = request_field(
         FieldKind("", str, lambda given, _: binding_path(given)),
         None,
         "file that says what the FMU's variables mean at our port",
         option=None,
     )
-    values: Mapping[str, Any] | None = asked(
+    values: Mapping[str, Any] | None = request_field(
         FieldKind("", str, plain),
         None,
         'of the converter, such as ``{"pod_p.K": 150}``; or of the damping test\'s '
         "study, which makes it another test",
         option=None,
     )
-    declared: Mapping[str, float] | None = asked(
+    declared: Mapping[str, float] | None = request_field(
         FieldKind("", str, plain),
         None,
         "what the applicant declares, for codes that compare the converter with that",
         option=None,
     )
-    pod: str | None = asked(
+    pod: str | None = request_field(
         one_of(PODS),
         None,
         "of nts631: damping controllers that are to be active: set in the FMU where it has "
@@ -195,25 +195,27 @@ class CertifyRequest:
         f"{{{','.join(PODS)}}}",
         python=f"active damping controllers, one of {', '.join(PODS)}; as the FMU shows them by default",
     )
-    reactances: Sequence[float] | None = asked(
+    reactances: Sequence[float] | None = request_field(
         FieldKind("X,X,…", read_reactances, _reactances),
         None,
         "of nts631: line reactances X_L [pu] (default: "
         "the norm's 13, 0.01 and 0.05 to 0.60; less is incomplete)",
         python="line reactances of the damping test [pu]; the norm's 13 by default, less is incomplete",
     )
-    black_box: bool = asked(
+    black_box: bool = request_field(
         FLAG, False, "of nts631: do not use the converter's states for the modes"
     )
-    check: bool = asked(FLAG, True, "whether the acceptance tests of the FMU are run", option=None)
-    folder: str | Path | None = asked(
+    check: bool = request_field(
+        FLAG, True, "whether the acceptance tests of the FMU are run", option=None
+    )
+    folder: str | Path | None = request_field(
         FILE,
         None,
         "for the certificate; ``results/certify_<file>[_<code>]`` by default. Points that are there are "
         "kept",
         option=None,
     )
-    into: str | Path | None = asked(
+    into: str | Path | None = request_field(
         FILE,
         None,
         "write the FMU with its certificate in it, and with experiments that any tool can repeat; "
@@ -222,14 +224,16 @@ class CertifyRequest:
         python="where the FMU is written with the "
         "certificate in it, and with experiments that any tool can repeat",
     )
-    sign: str | Path | None = asked(
+    sign: str | Path | None = request_field(
         FILE,
         None,
         "sign it: a private key of OpenSSH, the public key of one that the agent or hardware has, or a PEM key",
         "KEY",
     )
-    workers: int | None = asked(ANYTHING, 1, "processes; one for each core where None", option=None)
-    progress: bool = asked(FLAG, False, "show a bar", option=None)
+    workers: int | None = request_field(
+        ANYTHING, 1, "processes; one for each core where None", option=None
+    )
+    progress: bool = request_field(FLAG, False, "show a bar", option=None)
 
     def issue(self) -> "Issue":
         """How it is computed."""

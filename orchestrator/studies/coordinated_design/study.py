@@ -21,7 +21,7 @@ from orchestrator.core.asked import (
     RANKED,
     STAGES,
     Names,
-    asked,
+    request_field,
 )
 from orchestrator.core.errors import AnalysisError, InputError
 from orchestrator.core.options import Option
@@ -95,44 +95,50 @@ class PointsDesignRequest(OverCluster):
     True
     """
 
-    points: Any = asked(POINTS_FILE, MISSING, "operating points: a CSV file, as gfor screen has it")
-    controllers: Sequence[str] = asked(
+    points: Any = request_field(
+        POINTS_FILE, MISSING, "operating points: a CSV file, as gfor screen has it"
+    )
+    controllers: Sequence[str] = request_field(
         NAMES,
         ("pod_p",),
         '``"pod_p"``, ``"pod_q"``, or several; each gets a setting of its own, and as many as components are pairs',
         option=None,
     )
-    outages: Names | None = asked(
+    outages: Names | None = request_field(
         OUTAGES, None, "n-1, lines, units, or names, each at every point (repeatable)"
     )
     scenario: str | None = of_scenario("its name; by default the one without these controllers")
     values: Mapping[str, Any] | None = of_values()
     _: KW_ONLY
-    components: Sequence[str] = asked(
+    components: Sequence[str] = request_field(
         NAMES,
         (),
         "converters, or patterns, each with a setting of its own; as many as controllers: pairs",
         option="--component",
     )
-    modes: Sequence[str] = asked(
+    modes: Sequence[str] = request_field(
         NAMES, (), "the case's modes to damp (default: all from 0.1 to 2 Hz)", option="--mode"
     )
-    damping: float | None = asked(
+    damping: float | None = request_field(
         DAMPING,
         None,
         "required damping, such as 20",
         python="wanted everywhere; the best that there is by default",
     )
-    gain_bounds: tuple[float, float] = asked(GAIN_BOUNDS, (0.0, 400.0), "bounds of every gain [pu]")
-    stages: int | None = asked(STAGES, None, "lead/lag stages (default: the components' own)")
+    gain_bounds: tuple[float, float] = request_field(
+        GAIN_BOUNDS, (0.0, 400.0), "bounds of every gain [pu]"
+    )
+    stages: int | None = request_field(
+        STAGES, None, "lead/lag stages (default: the components' own)"
+    )
     # no other mode may fall below this damping ratio, or, where it is below already, below what it has
-    least_damping: float = asked(
+    least_damping: float = request_field(
         DAMPING,
         0.05,
         "damping below which no other mode may be pushed (default: 5)",
         option="--min-damping",
     )
-    ranked: int = asked(
+    ranked: int = request_field(
         RANKED,
         3,
         "converters for which a controller alone is designed to rank them (default: 3)",

@@ -7,7 +7,16 @@ from typing import Any, cast
 
 from orchestrator.cases.form.devices import Device, devices_of
 from orchestrator.cases.form.given import binding_path
-from orchestrator.core.asked import FLAG, FREQUENCIES, NAME, NAMES, SHARE, FieldKind, Names, asked
+from orchestrator.core.asked import (
+    FLAG,
+    FREQUENCIES,
+    NAME,
+    NAMES,
+    SHARE,
+    FieldKind,
+    Names,
+    request_field,
+)
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
@@ -53,41 +62,41 @@ class InteractionsRequest(OverPoints):
     scenario: str | None = of_scenario("its name; may be left out where the case has one only")
     values: Mapping[str, Any] | None = of_values()
     _: KW_ONLY
-    threshold: float = asked(
+    threshold: float = request_field(
         SHARE,
         0.05,
         "share of a mode from which on a vendor takes part in it (default: 5)",
         python="share of a mode, from 0 to 0.5, from which on a vendor takes part in it",
     )
-    frequencies: tuple[float, float] = asked(
+    frequencies: tuple[float, float] = request_field(
         FREQUENCIES, RANGE_HZ, "frequencies [Hz] (default: 0.1:100)", option="--range"
     )
-    stand_in: str | None = asked(
+    stand_in: str | None = request_field(
         NAME,
         None,
         "model at the places of the vendors that a system does without (default: static_generation, a "
         "current without dynamics; gfor is the reference converter)",
         "MODEL",
     )
-    swap: bool = asked(FLAG, False, "each vendor's device at each place, in all ways")
-    devices: Mapping[str, str | Path] | tuple[str, ...] | tuple[Device, ...] = asked(
+    swap: bool = request_field(FLAG, False, "each vendor's device at each place, in all ways")
+    devices: Mapping[str, str | Path] | tuple[str, ...] | tuple[Device, ...] = request_field(
         _DEVICES,
         (),
         "try this FMU or DLL at the places as well; it implies --swap (repeatable)",
         option="--device",
         python="files, by name, of devices that are tried at the places as well; that implies ``swap``",
     )
-    bindings: Mapping[str, str | Path] | tuple[str, ...] = asked(
+    bindings: Mapping[str, str | Path] | tuple[str, ...] = request_field(
         _BINDINGS,
         (),
         "binding of a --device (repeatable)",
         option="--binding",
         python="files, by name of a device",
     )
-    places: Names = asked(
+    places: Names = request_field(
         NAMES, (), "swap only at this place (repeatable)", "COMPONENT", option="--place"
     )
-    black_box: bool = asked(
+    black_box: bool = request_field(
         FLAG, False, "identify the components that hide their states from their inputs and outputs"
     )
 

@@ -16,10 +16,10 @@ from orchestrator.core.asked import (
     NAMES,
     FieldKind,
     Names,
-    asked,
     names,
     one_of,
     plain_value,
+    request_field,
 )
 from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
@@ -40,13 +40,13 @@ _SHARING, _SCHEDULE, _STOP = one_of(SharingRule), one_of(SCHEDULES), FieldKind("
 
 @dataclass(frozen=True, kw_only=True)
 class Preparing(OfCase):
-    schedule: ScheduleName | None = asked(
+    schedule: ScheduleName | None = request_field(
         _SCHEDULE,
         None,
         "``gauss-seidel``, ``jacobi``, ``midpoint`` or ``newton``; the case's by default",
         option=None,
     )
-    tolerance: float | None = asked(
+    tolerance: float | None = request_field(
         ANYTHING,
         None,
         "steps of a run are as long as this error of a coupled output allows, of 1 or of its value, "
@@ -54,7 +54,7 @@ class Preparing(OfCase):
         "case's",
         option=None,
     )
-    sharing: str | None = asked(
+    sharing: str | None = request_field(
         _SHARING,
         None,
         "how the other units replace the power of a unit that ``values`` take out of service, such as by "
@@ -97,19 +97,19 @@ class ScenarioRequest(Preparing):
     0.3
     """
 
-    name: str | None = asked(
+    name: str | None = request_field(
         ANYTHING, None, "of the scenario; may be left out where the case has one only", option=None
     )
     values: Mapping[str, Any] | None = of_values()
     _: KW_ONLY
-    force: Names = asked(
+    force: Names = request_field(
         NAMES,
         (),
         'references that swing, in the place of the case\'s events: ``"sg1 0.8 Hz 2 %"``, as ``gfor run '
         "--force``",
         option=None,
     )
-    fault: Names = asked(
+    fault: Names = request_field(
         NAMES,
         (),
         'short circuits in the place of the case\'s events: ``"bus_9, 150 ms"``',
@@ -137,7 +137,7 @@ class ScenariosRequest(Preparing):
     names: Names = of_scenarios()
     values: Mapping[str, Any] | None = of_values()
     _: KW_ONLY
-    stop: Time | None = asked(
+    stop: Time | None = request_field(
         _STOP, None, "time at which runs end [s]; the case's by default", option=None
     )
 
@@ -162,13 +162,13 @@ class ModesRequest:
     2             0.34            32.70
     """
 
-    frequencies: tuple[float, float] = asked(
+    frequencies: tuple[float, float] = request_field(
         FREQUENCIES,
         ELECTROMECHANICAL_HZ,
         "frequencies shown [Hz] (default: 0.1:2)",
         option="--range",
     )
-    critical: float | None = asked(
+    critical: float | None = request_field(
         DAMPING,
         None,
         "only modes with less damping than this (20 by default), by sparse search instead of the full "
@@ -178,13 +178,13 @@ class ModesRequest:
         "whole spectrum is computed",
     )
     _: KW_ONLY
-    directional: bool = asked(
+    directional: bool = request_field(
         FLAG,
         False,
         "linearise with the FMUs' own directional derivatives instead of by perturbation (with --native)",
     )
     black_box: bool = of_black_box()
-    report: Callable[[str], None] | None = asked(
+    report: Callable[[str], None] | None = request_field(
         CALLED,
         None,
         "called with a sentence before each run of an identification, which may take minutes; such as "
@@ -275,26 +275,26 @@ class StepsRequest:
     0.0005
     """
 
-    allowed: tuple[float, float] = asked(
+    allowed: tuple[float, float] = request_field(
         _ERRORS,
         (1e-3, 0.1),
         "accepted error of a critical mode's frequency [Hz] and damping [points] (default: "
         "0.001:0.1)",
         option="--error",
     )
-    steps: Sequence[Time] = asked(
+    steps: Sequence[Time] = request_field(
         _STEPS,
         (),
         "communication steps to try, such as '100 us,500 us' (default: 0.5 to 50 times the case's own)",
         option="--try",
     )
-    schedules: Names = asked(
+    schedules: Names = request_field(
         _SCHEDULES,
         (),
         f"schedule to try (repeatable; default: {', '.join(TRIED)})",
         option="--schedule",
     )
-    frequencies: tuple[float, float] = asked(
+    frequencies: tuple[float, float] = request_field(
         FREQUENCIES,
         ELECTROMECHANICAL_HZ,
         "frequencies of the critical modes [Hz] (default: 0.1:2)",

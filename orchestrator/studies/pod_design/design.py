@@ -12,7 +12,7 @@ from orchestrator.cases.case import Case
 from orchestrator.cases.form.definition import CaseDefinition
 from orchestrator.cases.form.schema import Value
 from orchestrator.cases.scenario.prepare import PreparedScenario
-from orchestrator.core.asked import DAMPING, FLAG, GAIN, GAIN_BOUNDS, NAME, STAGES, asked
+from orchestrator.core.asked import DAMPING, FLAG, GAIN, GAIN_BOUNDS, NAME, STAGES, request_field
 from orchestrator.core.errors import AnalysisError, InputError
 from orchestrator.core.options import Option
 from orchestrator.linear.doubts.examination import Examination
@@ -70,49 +70,53 @@ class DesignRequest(OfCase):
     200.0
     """
 
-    controller: str = asked(ANYTHING, MISSING, '``"pod_p"`` or ``"pod_q"``', option=None)
+    controller: str = request_field(ANYTHING, MISSING, '``"pod_p"`` or ``"pod_q"``', option=None)
     scenario: str | None = of_scenario("its name; by default the one without this controller")
     values: Mapping[str, Any] | None = of_values()
     _: KW_ONLY
-    component: str | None = asked(
+    component: str | None = request_field(
         NAME, None, "the converter, or a pattern for several with one setting"
     )
-    mode: str | None = asked(
+    mode: str | None = request_field(
         NAME,
         None,
         "the case's mode to damp (default: its first; the least damped swing where it names none)",
     )
-    damping: float | None = asked(DAMPING, None, "required damping, such as 20")
-    damping_increment: float | None = asked(
+    damping: float | None = request_field(DAMPING, None, "required damping, such as 20")
+    damping_increment: float | None = request_field(
         DAMPING,
         None,
         "required increase of the damping in points (default: 10)",
         "POINTS",
         python="required increase of the damping, in points and in the place of ``damping``",
     )
-    delta_gain: float = asked(
+    delta_gain: float = request_field(
         GAIN, 50.0, "gain of the finite-difference sensitivity [pu] (default: 50)"
     )
-    gain_bounds: tuple[float, float] | None = asked(
+    gain_bounds: tuple[float, float] | None = request_field(
         GAIN_BOUNDS,
         None,
         "bounds of the gain [pu] (default: 200:400, and 0:400 in a search or with --points)",
     )
-    stages: int | None = asked(STAGES, None, "lead/lag stages (default: the component's own)")
-    compensated_gain: bool = asked(
+    stages: int | None = request_field(
+        STAGES, None, "lead/lag stages (default: the component's own)"
+    )
+    compensated_gain: bool = request_field(
         FLAG, False, "compute the gain from the sensitivity with the lead/lag in place", option=None
     )
-    least_damping: float = asked(
+    least_damping: float = request_field(
         DAMPING,
         0.05,
         "damping below which no other mode may be pushed (default: 5)",
         option="--min-damping",
     )
-    refine: bool = asked(
+    refine: bool = request_field(
         FLAG, False, "search gain and lead/lag on the closed loop (without bounds: where needed)"
     )
-    margins: bool = asked(FLAG, True, "compute the margins, which take longest", option=None)
-    progress: bool = asked(
+    margins: bool = request_field(
+        FLAG, True, "compute the margins, which take longest", option=None
+    )
+    progress: bool = request_field(
         FLAG, False, "show a line with the stage that the design has come to", option=None
     )
 

@@ -16,7 +16,15 @@ from orchestrator.cases.form.given import (
 from orchestrator.cases.form.parameter_files import ParameterFile
 from orchestrator.cases.form.schema import Value
 from orchestrator.cases.settings.layers import OptionValues
-from orchestrator.core.asked import FLAG, FREQUENCIES, NAMES, FieldKind, asked, seen, text_or_none
+from orchestrator.core.asked import (
+    FLAG,
+    FREQUENCIES,
+    NAMES,
+    FieldKind,
+    request_field,
+    seen,
+    text_or_none,
+)
 from orchestrator.core.errors import InputError
 from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ
 from orchestrator.systems.coupling.no_trip_regions import NO_TRIP_REGIONS, read_no_trip_code
@@ -40,15 +48,15 @@ _SCENARIO = FieldKind(
 
 
 def of_scenario(text: str = "its name; the first one where None") -> Any:
-    return asked(_SCENARIO, None, text, option=None)
+    return request_field(_SCENARIO, None, text, option=None)
 
 
 def of_scenarios() -> Any:
-    return asked(NAMES, (), "names of the scenarios; all of them where empty", option=None)
+    return request_field(NAMES, (), "names of the scenarios; all of them where empty", option=None)
 
 
 def of_values() -> Any:
-    return asked(
+    return request_field(
         _VALUES,
         None,
         "values by ``component.variable``, as with ``--set``: numbers, truth values, or text such as "
@@ -59,7 +67,7 @@ def of_values() -> Any:
 
 def of_frequencies(python: str = "") -> Any:
     """The range of a study's modes; ``python`` says what they are for where "frequencies" does not."""
-    return asked(
+    return request_field(
         FREQUENCIES,
         ELECTROMECHANICAL_HZ,
         "frequencies [Hz] (0.1:2)",
@@ -78,7 +86,7 @@ def _known_code(given: Any, argument: str) -> Any:
 
 def of_protection(option: str | None = "") -> Any:
     """The code by which converters trip that have no relays of their own; None for no option."""
-    return asked(
+    return request_field(
         FieldKind("CODE", read_no_trip_code, _known_code),
         None,
         "converters without relays of their own trip as soon as this code lets them: prc029",
@@ -87,7 +95,7 @@ def of_protection(option: str | None = "") -> Any:
 
 
 def of_black_box() -> Any:
-    return asked(
+    return request_field(
         FLAG, False, "identify the components that hide their states from their inputs and outputs"
     )
 
@@ -122,10 +130,10 @@ class _Layered:
 class OfCase(_Layered):
     """Asked of every study; scenario and values stand among the fields of each, where Python takes them by place."""
 
-    step: Time | None = asked(
+    step: Time | None = request_field(
         _STEP, None, "communication step [s]; the case's by default", option=None
     )
-    parameters: Paths = asked(
+    parameters: Paths = request_field(
         _FILES, (), "parameter files, as ``gfor design`` writes them", option=None
     )
 
@@ -134,30 +142,30 @@ class OfCase(_Layered):
 class OverPoints(OfCase):
     """Asked of every study that computes points side by side; no value depends on it."""
 
-    workers: int | None = asked(
+    workers: int | None = request_field(
         ANYTHING, 1, "processes to compute in; one for each core where None", option=None
     )
-    folder: str | Path | None = asked(
+    folder: str | Path | None = request_field(
         ANYTHING,
         None,
         "keeps the points: a later study with this folder reads them instead of computing them again; "
         "without a folder they are forgotten",
         option=None,
     )
-    progress: bool = asked(FLAG, False, "show a bar", option=None)
+    progress: bool = request_field(FLAG, False, "show a bar", option=None)
 
 
 @dataclass(frozen=True, kw_only=True)
 class OverCluster(OverPoints):
     """A study whose points a Dask cluster may compute as well."""
 
-    scheduler: str | None = asked(
+    scheduler: str | None = request_field(
         ANYTHING,
         None,
         "address of a Dask cluster to compute on instead, such as ``tcp://host:8786``",
         option=None,
     )
-    tls: str | Path | None = asked(
+    tls: str | Path | None = request_field(
         ANYTHING,
         None,
         "folder with ``ca.pem``, ``cert.pem`` and ``key.pem``, for a scheduler at ``tls://host:8786``",

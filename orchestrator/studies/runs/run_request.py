@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.form.given import Time, in_seconds
-from orchestrator.core.asked import FLAG, FieldKind, asked, read_whole, whole_number
+from orchestrator.core.asked import FLAG, FieldKind, read_whole, request_field, whole_number
 from orchestrator.core.cores import MOST_THREADS
 from orchestrator.core.errors import InputError
 from orchestrator.output.results.recording_writer import RecordingFolder
@@ -74,16 +74,18 @@ class RunRequest:
     the voltage falls to 0.92 pu
     """
 
-    stop: Time | None = asked(
+    stop: Time | None = request_field(
         _TIME, None, "time at which the run ends [s]; the case's by default", option=None
     )
     _: KW_ONLY
-    linear: bool = asked(FLAG, False, "lay the linear model's response over the simulated one")
-    progress: bool = asked(FLAG, False, "show a bar", option=None)
-    observers: Sequence[Observer] = asked(
+    linear: bool = request_field(
+        FLAG, False, "lay the linear model's response over the simulated one"
+    )
+    progress: bool = request_field(FLAG, False, "show a bar", option=None)
+    observers: Sequence[Observer] = request_field(
         _OBSERVERS, (), "what else looks on at every communication step", option=None
     )
-    recording: RecordingFolder | None = asked(
+    recording: RecordingFolder | None = request_field(
         _RECORDING,
         None,
         "a folder on the disk that takes the rows while the run goes on; by default they stay in "
@@ -91,24 +93,24 @@ class RunRequest:
         "Python ends",
         option=None,
     )
-    checkpoints: str | Path | Checkpoints | None = asked(
+    checkpoints: str | Path | Checkpoints | None = request_field(
         ANYTHING,
         None,
         "folder in which the run is kept while it goes on; by default none. It is empty again at the "
         "end, but for the recording of a run that would need more than 256 MB",
         option=None,
     )
-    checkpoint_every: Time = asked(
+    checkpoint_every: Time = request_field(
         _TIME, EVERY, "wall-clock time between two checkpoints [s]", option=None
     )
-    federates: Federates | None = asked(
+    federates: Federates | None = request_field(
         _FEDERATES,
         None,
         'components that run as federates at HELICS, such as ``Federates(("gfor",))`` of '
         "`orchestrator.simulation.federation.choice`; by default everything runs here",
         option=None,
     )
-    threads: int | None = asked(
+    threads: int | None = request_field(
         _THREADS,
         None,
         "threads that step native FMUs (default: as many as are faster than one, up to one for each "
@@ -117,7 +119,7 @@ class RunRequest:
         "a step shortest, up to one for each core, and only while they are seen to be faster than one. No value "
         "depends on it",
     )
-    black_box: bool = asked(
+    black_box: bool = request_field(
         FLAG,
         False,
         "identify the components that hide their states, for the modes before the events; else there are "

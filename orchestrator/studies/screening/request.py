@@ -13,10 +13,10 @@ from orchestrator.core.asked import (
     OUTAGES,
     FieldKind,
     Names,
-    asked,
     one_of,
     percent,
     read_percent,
+    request_field,
 )
 from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
@@ -72,14 +72,14 @@ class ScreeningRequest(OverCluster):
     0  00:00          0.58            10.57
     """
 
-    points: Any = asked(
+    points: Any = request_field(
         POINTS_FILE,
         None,
         "operating points: a CSV file, a row each (default: the case as it is)",
         python="CSV file or DataFrame, a row each: a column ``time`` or ``name``, and what differs from the case; or "
         '``{"night": {"load": 0.6}}``; the case as it is by default',
     )
-    outages: Names | None = asked(
+    outages: Names | None = request_field(
         OUTAGES,
         None,
         "n-1, lines, units, or names such as line_1_2,sg3 or line_1_2+sg3 (repeatable)",
@@ -87,20 +87,20 @@ class ScreeningRequest(OverCluster):
     scenario: str | None = of_scenario()
     values: Mapping[str, Any] | None = of_values()
     _: KW_ONLY
-    sharing: str | None = asked(
+    sharing: str | None = request_field(
         one_of(SharingRule),
         None,
         "who feeds what an outage takes: droop (units by droop and rating, the default), "
         "rating, or slack (the slack alone)",
     )
-    move_controls: bool = asked(
+    move_controls: bool = request_field(
         FLAG,
         False,
         "after an outage, taps and switched shunts of a RAW file move step by step to hold voltages in their bands",
         python="whether taps and switched shunts of a RAW file move after an outage until voltages are in their bands, "
         "rather than being held",
     )
-    trips: Time | None = asked(
+    trips: Time | None = request_field(
         _TIME,
         None,
         "let each outage happen in a run that goes on for so long after it, such as '5 s', and say whose relays trip "
@@ -108,7 +108,7 @@ class ScreeningRequest(OverCluster):
         python="how long a run goes on after each outage, such as ``'5 s'``: it says whose relays trip and who loses "
         "synchronism; without it there are no runs",
     )
-    cleared_after: Time | None = asked(
+    cleared_after: Time | None = request_field(
         _TIME,
         None,
         "in these runs a three-phase short circuit at the first bus of what is lost lasts so long before the outage, "
@@ -118,10 +118,10 @@ class ScreeningRequest(OverCluster):
     frequencies: tuple[float, float] = of_frequencies(
         "modes from the first to the second are critical [Hz], where they are damped less than ``damping``"
     )
-    damping: float = asked(
+    damping: float = request_field(
         _DAMPING, 0.2, "damping below which a mode is critical, at most 60 (default: 20)"
     )
-    whole: bool = asked(
+    whole: bool = request_field(
         FLAG,
         False,
         "count growing modes of all frequencies at every point; takes longer",

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass
 
-from orchestrator.core.asked import CALLED, FLAG, NAME, NAMES, Names, asked
+from orchestrator.core.asked import CALLED, FLAG, NAME, NAMES, Names, request_field
 from orchestrator.studies.points.points import nobody
 from orchestrator.studies.points.request import of_frequencies
 
@@ -30,12 +30,12 @@ class SensitivitiesRequest:
     -0.046
     """
 
-    mode: str | None = asked(
+    mode: str | None = request_field(
         NAME,
         None,
         "a mode that the case names, or 'critical' for the least damped one (default: the first named one)",
     )
-    parameters: Names = asked(
+    parameters: Names = request_field(
         NAMES,
         (),
         "only this one, tunable or fixed; also a pattern (repeatable; default: all tunable ones)",
@@ -44,21 +44,21 @@ class SensitivitiesRequest:
         python="names ``component.variable``, also with ``*``; by default all tunable ones",
     )
     _: KW_ONLY
-    fixed: bool = asked(
+    fixed: bool = request_field(
         FLAG, False, "fixed parameters too: the case is started several times for each"
     )
-    held: bool = asked(
+    held: bool = request_field(
         FLAG,
         False,
         "partial derivatives at the held operating point, instead of the total ones; tunable parameters "
         "only",
     )
     frequencies: tuple[float, float] = of_frequencies()
-    directional: bool = asked(
+    directional: bool = request_field(
         FLAG,
         False,
         "linearise with the FMUs' own directional derivatives instead of by perturbation (with --native)",
     )
-    report: Callable[[int, int], None] = asked(
+    report: Callable[[int, int], None] = request_field(
         CALLED, nobody, "called with how many parameters are done, of how many", option=None
     )

@@ -18,7 +18,7 @@ from orchestrator.core.asked import (
     RANKED,
     FieldKind,
     Names,
-    asked,
+    request_field,
     text_or_none,
 )
 from orchestrator.core.asked import positive as above_zero
@@ -72,7 +72,7 @@ class SiteRequest(OfCase):
     (('bus_2', 'bus_3'), True)
     """
 
-    device: str | Path = asked(
+    device: str | Path = request_field(
         _DEVICE,
         "pod_p",
         "pod_p (default), pod_q, droop, regulator (a machine's), or a vendor's .fmu",
@@ -80,34 +80,34 @@ class SiteRequest(OfCase):
     scenario: str | None = of_scenario()
     values: Mapping[str, Any] | None = of_values()
     _: KW_ONLY
-    binding: str | Path | None = asked(FILE, None, "binding of the vendor's FMU")
-    below: float = asked(
+    binding: str | Path | None = request_field(FILE, None, "binding of the vendor's FMU")
+    below: float = request_field(
         DAMPING,
         0.1,
         "damping of poorly damped modes (default: 10)",
         python="damping [%] of the modes that are looked at; the least damped one where none is damped so little",
     )
     frequencies: tuple[float, float] = of_frequencies()
-    outages: Names | None = asked(
+    outages: Names | None = request_field(
         OUTAGES, None, "rank for these as well: n-1, lines, units, or names (repeatable)"
     )
-    buses: Sequence[str] = asked(
+    buses: Sequence[str] = request_field(
         NAMES,
         (),
         "only these may be the place, such as 9, bus_9 or 'bus_1*' (default: all but units' terminals)",
     )
-    confirm: int = asked(
+    confirm: int = request_field(
         RANKED,
         3,
         "confirm the best N by coupled FMUs (default: 3)",
         python="how many of the best buses are confirmed by coupled FMUs",
     )
-    rating: float | None = asked(
+    rating: float | None = request_field(
         _RATING,
         None,
         "of the converter that confirms (default: 100), or of the vendor's FMU (default: its own)",
     )
-    gain: float = asked(
+    gain: float = request_field(
         POSITIVE, 200.0, "largest of its POD [pu of its rating] (default: 200)", "K"
     )
 

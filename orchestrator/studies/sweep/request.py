@@ -5,7 +5,7 @@ from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 from orchestrator.cases.form.given import check_case_name
-from orchestrator.core.asked import FieldKind, Names, asked, plain_value, read_part
+from orchestrator.core.asked import FieldKind, Names, plain_value, read_part, request_field
 from orchestrator.core.errors import InputError
 from orchestrator.studies.points.request import (
     OverCluster,
@@ -116,7 +116,7 @@ class SweepRequest(OverCluster):
     1       0.2          0.43            18.01
     """
 
-    vary: Mapping[str, Iterable[Any]] | Iterable[str | Vary] = asked(
+    vary: Mapping[str, Iterable[Any]] | Iterable[str | Vary] = request_field(
         _VARY,
         (),
         "what to vary; also =log:START:STOP:COUNT and =0.1,0.2,0.5 (repeatable: a full grid, followed along "
@@ -128,7 +128,7 @@ class SweepRequest(OverCluster):
     scenarios: Names = of_scenarios()
     values: Mapping[str, Any] | None = of_values()
     _: KW_ONLY
-    until: str | float | Until | None = asked(
+    until: str | float | Until | None = request_field(
         _UNTIL,
         None,
         "how far the range START:STOP may go before the system is unstable, or a mode of --range is "

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 import pytest
 
-from orchestrator.core.asked import DAMPING, FLAG, NAMES, STAGES, asked, asked_of, checked
+from orchestrator.core.asked import DAMPING, FLAG, NAMES, STAGES, asked_of, checked, request_field
 from orchestrator.core.errors import InputError
 from orchestrator.face.api.case import Case
 from orchestrator.face.api.certification import certify
@@ -27,12 +27,12 @@ from tests.test_docstrings import explained
 
 @dataclass(frozen=True)
 class Some:
-    damping: float | None = asked(DAMPING, None, "wanted")
-    least_damping: float = asked(DAMPING, 0.05, "of others", option="--min-damping")
-    stages: int = asked(STAGES, 2, "of the filter")
-    names: tuple[str, ...] = asked(NAMES, ("all",), "of converters", option="--name")
-    refine: bool = asked(FLAG, False, "search")
-    margins: bool = asked(FLAG, True, "in Python alone", option=None)
+    damping: float | None = request_field(DAMPING, None, "wanted")
+    least_damping: float = request_field(DAMPING, 0.05, "of others", option="--min-damping")
+    stages: int = request_field(STAGES, 2, "of the filter")
+    names: tuple[str, ...] = request_field(NAMES, ("all",), "of converters", option="--name")
+    refine: bool = request_field(FLAG, False, "search")
+    margins: bool = request_field(FLAG, True, "in Python alone", option=None)
 
 
 def read(*words):
@@ -99,3 +99,11 @@ def test_a_function_has_the_keywords_and_the_words_of_its_request():
 def test_defaults_are_shown_in_pythons_units():
     assert inspect.signature(Case.screen).parameters["damping"].default == 20
     assert inspect.signature(Case.design).parameters["least_damping"].default == 5
+
+
+def test_a_plug_in_may_declare_its_fields_by_the_former_name():
+    with pytest.warns(DeprecationWarning, match="asked is now .*request_field"):
+        from orchestrator.core.asked import asked  # noqa: PLC0415
+    assert asked is request_field
+    with pytest.raises(ImportError):
+        from orchestrator.core.asked import told  # noqa: F401, PLC0415

@@ -42,7 +42,7 @@ SURFACES = (
     "face/agents/",
     "face/explore/",
 )  # for those who type, who alone see their words
-DECLARING = ("asked", "FieldKind", "StudyAtOnce")  # of options, with their help
+DECLARING = ("request_field", "FieldKind", "StudyAtOnce")  # of options, with their help
 ONLY_TYPED = (
     r"`gfor (new|certify|[^`]*--(json|with-linear-model)\b)[^`]*`"  # commands that Python has not
 )
