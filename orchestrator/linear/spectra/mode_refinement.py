@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from orchestrator.core.arrays import Vector
 from orchestrator.core.errors import AnalysisError
 from orchestrator.linear.models.linear_model import LinearModel
-from orchestrator.linear.spectra.modes import damping_ratio
+from orchestrator.linear.spectra.modes import damping_ratio, to_continuous
 from orchestrator.linear.spectra.shifted_equations import ShiftedEquations
 
 _ROUNDS = 8
@@ -39,7 +39,8 @@ class RefinedModes:
     values: NDArray[np.complex128]
     left: Vector
     right: Vector
-    settled: bool  # Whether the last round left them where they were. Others are not to be trusted.
+    # whether the last round left them where they were, with vectors that fit; others are not to be trusted
+    settled: bool
 
 
 def refine(
@@ -49,7 +50,7 @@ def refine(
     left: Vector,
     right: Vector,
 ) -> RefinedModes:
-    """Modes of a continuous model, from values and vectors that are nearly so."""
+    """Modes of a model, continuous or a step map, from values and vectors that are nearly so."""
     settled = False
     for _ in range(_ROUNDS):
         new_left, new_right = left.copy(), right.copy()
@@ -65,13 +66,19 @@ def refine(
         found, of_left, of_right = scipy.linalg.eig(small, mass, left=True, right=True)
         if not np.isfinite(found).all():
             break
+        found, alive = to_continuous(found, model.step_size)
+        if not alive.all():
+            break
         order = _in_order_of(values, found)
         before, values = values, found[order]
         left, right = new_left @ of_left[:, order], new_right @ of_right[:, order]
-        settled = bool(np.all(np.abs(values - before) <= _SETTLED * np.abs(values)))
+        still = bool(np.all(np.abs(values - before) <= _SETTLED * np.abs(values)))
+        # Eigenvalues have the square of the vectors' accuracy, and a state that is much faster than its mode shows
+        # what a vector lacks enlarged: the values may stand still some rounds before the vectors are right.
+        settled = still and _are_eigenvectors(model, values, right)
         if settled:
             break
-    return RefinedModes(values, left, right, settled and _are_eigenvectors(model, values, right))
+    return RefinedModes(values, left, right, settled)
 
 
 def _groups(values: NDArray[np.complex128]) -> list[NDArray[np.int64]]:
@@ -98,9 +105,9 @@ def _in_order_of(
 
 
 def _are_eigenvectors(model: LinearModel, values: NDArray[np.complex128], right: Vector) -> bool:
-    """Return whether A·r is λ·r, as far as rounding lets it be."""
-    moved = model.apply(right)
-    rest = np.abs(moved - right * values).max(axis=0)
+    """Return whether A·r is λ·r, as far as rounding lets it be; of a step map, what is left over is by its step."""
+    own = values if model.step_size is None else np.exp(values * model.step_size)
+    rest = np.abs(model.apply(right) - right * own).max(axis=0) / (model.step_size or 1.0)
     return bool(np.all(rest <= _REST * np.maximum(1.0, np.abs(values)) * np.abs(right).max(axis=0)))
 
 
@@ -143,6 +150,7 @@ def _unknown(
 ) -> list[complex]:
     """All unknown eigenvalues nearer to a point than a radius, and some farther ones."""
     factors, n = equations.at(centre), right.shape[0]
+    reach = equations.reach(centre, radius)
 
     def solve(vector: Vector) -> Vector:
         rest = vector.reshape(n, 1)
@@ -168,8 +176,8 @@ def _unknown(
             raise AnalysisError(
                 f"the search for modes around {centre:.3g} rad/s does not converge; compute the full spectrum"
             ) from error
-        values = centre + 1 / nu
-        if np.abs(values - centre).max() > radius:
+        values = equations.rates_around(centre, nu)
+        if (1 / np.abs(nu)).max() > reach:
             return [complex(value) for value in values]
         count *= 2
     raise AnalysisError(

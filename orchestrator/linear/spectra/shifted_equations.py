@@ -1,11 +1,12 @@
-"""A − σI of one linear model at many points σ, and how many modes grow, without finding them.
+"""A − σI of one linear model at many points, and how many modes grow, without finding them.
 
-The equations are put together once, and factorised at each point: by blocks and a hub where the model has one, sparse
-elsewhere. The number of growing modes is that of the turns of det(A − sI) along the imaginary axis. It does not come
-from any search, so it shows whether a search has missed a mode. The logarithm of the determinant is followed from point
-to point, and points are added where it changes quickly. As many poles as there are modes are divided out first: the
-eigenvalues of the components alone, some of them replaced by known modes beside them. What is left comes to rest far
-from 0, and changes the less the more alike poles and modes are; the count does not depend on the poles."""
+Points are given in the plane of λ [rad/s]: of a step map, σ = exp(λ·H). The equations are put together once, and
+factorised at each point: by blocks and a hub where the model has one, sparse elsewhere. The number of growing modes is
+that of the turns of det(A − sI) along the imaginary axis. It does not come from any search, so it shows whether a
+search has missed a mode. The logarithm of the determinant is followed from point to point, and points are added where
+it changes quickly. As many poles as there are modes are divided out first: the eigenvalues of the components alone,
+some of them replaced by known modes beside them. What is left comes to rest far from 0, and changes the less the more
+alike poles and modes are; the count does not depend on the poles."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -60,6 +61,9 @@ class FactorsByHub:
         return self.factors.log_determinant
 
 
+_ROUND = 65  # points on a circle whose image is looked at
+
+
 class ShiftedEquations:
     def __init__(self, model: LinearModel) -> None:
         n, self._hub = len(model.names), model.hub
@@ -71,15 +75,34 @@ class ShiftedEquations:
         whole = sp.coo_array((values, (rows, columns)), shape=(size, size)).tocsc()
         column_of = np.repeat(np.arange(size), np.diff(whole.indptr))
         self._diagonal = np.flatnonzero((whole.indices == column_of) & (column_of < n))
-        self._whole, self._n = whole.astype(complex), n
+        self._whole, self._n, self._step = whole.astype(complex), n, model.step_size
 
     def log_determinants(self, points: Points) -> Points:
-        """Log det(A − sI) at each point; see `Determinants`."""
+        """Log det(A − sI) at each point of a continuous model; see `Determinants`."""
+        if self._step is not None:
+            raise ValueError("a step map's determinant turns along a circle, and not along a line")
         return np.array([self.at(s).log_determinant for s in points.tolist()])
 
-    def at(self, sigma: complex) -> Factors | FactorsByHub:
+    def at(self, rate: complex) -> Factors | FactorsByHub:
+        """The equations at a point λ [rad/s]."""
+        sigma = self._own(rate)
         found = None if self._hub is None else self._hub.at(complex(sigma))
         return self._sparse_at(sigma) if found is None else FactorsByHub(found)
+
+    def rates_around(self, rate: complex, nu: Vector) -> NDArray[np.complex128]:
+        """Eigenvalues λ [rad/s] from those of (A − σI)⁻¹ at a point."""
+        own = np.asarray(self._own(rate) + 1 / nu, dtype=complex)
+        return own if self._step is None else np.asarray(np.log(own) / self._step)
+
+    def reach(self, rate: complex, radius: float) -> float:
+        """Distance from a point's σ of the farthest point of a circle around λ [rad/s]."""
+        if self._step is None:
+            return radius
+        circle = rate + radius * np.exp(1j * np.linspace(0, 2 * np.pi, _ROUND))
+        return float(np.abs(np.exp(circle * self._step) - self._own(rate)).max())
+
+    def _own(self, rate: complex) -> complex:
+        return rate if self._step is None else complex(np.exp(rate * self._step))
 
     def _sparse_at(self, sigma: complex) -> Factors:
         shifted = self._whole.copy()
@@ -142,7 +165,7 @@ def count_growing(
     line: float = GROWING,
     clear: float = GROWING,
 ) -> int:
-    """Number of eigenvalues to the right of a line, at any frequency; a pair counts twice.
+    """Number of eigenvalues of a continuous model to the right of a line, at any frequency; a pair counts twice.
 
     ``alone``: all eigenvalues of its components, each alone with its inputs held [rad/s]. Far from 0, the system's
     determinant is theirs.

@@ -7,11 +7,12 @@ from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Vector
 from orchestrator.core.errors import AnalysisError
+from orchestrator.core.threads import one_thread
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.critical_modes import DENSE, find_critical_modes, nearest_pairs
 from orchestrator.linear.spectra.mode_refinement import RefinedModes, misses_modes, refine
 from orchestrator.linear.spectra.mode_tracking import ModeSet
-from orchestrator.linear.spectra.modes import ZERO, damping_ratio, find_spectrum
+from orchestrator.linear.spectra.modes import ZERO, damping_ratio, eigenvalues, find_spectrum
 from orchestrator.linear.spectra.shifted_equations import GROWING, ShiftedEquations, count_growing
 from orchestrator.linear.spectra.stability import grows
 
@@ -20,14 +21,16 @@ _BEYOND = 1.3
 already."""
 
 _MOST_STATES = 4000
-"""Up to this number of states, all eigenvalues are computed where a search for some of them does not converge: they
-take some minutes and a gigabyte."""
+"""Up to this number of states, all eigenvalues are computed where growth is counted (4 s of processor time with 3,000
+states), and where a search for some of them does not converge."""
 
 _BESIDE_ZERO = 1e-2
 """Place [rad/s] beside 0 whose nearest eigenvalues are sought: those that are zero or grow slowly are among them."""
 
 _NEAREST = 6
 """Eigenvalues that are sought there."""
+
+_ONE = 1e-5  # two eigenvalues that differ by less than this part are one, computed in two ways
 
 _MOST = 0.9
 MOST_DAMPING = 0.6  # damping ratio up to which modes are looked for
@@ -104,6 +107,8 @@ def find_modes_here(
             return _whole(model, wanted)
     if not count:
         return FoundModes(found, searched, None)
+    if len(model.names) <= _MOST_STATES:
+        return _counted_among_all(model, found, searched=searched)
     zeros, slow = _near_zero(model, found)
     return FoundModes(
         found, searched, _elsewhere(equations, alone, found) + slow, None, zeros, GROWING
@@ -169,11 +174,25 @@ def _whole(model: LinearModel, wanted: CriticalRegion) -> FoundModes:
     modes = _modes_within(
         ModeSet.of([mode for mode in spectrum.modes if mode.is_oscillation], model.names), wanted
     )
-    growing = spectrum.eigenvalues[grows(spectrum.eigenvalues)]
-    others = growing[(np.abs(growing) > ZERO) & ~np.isin(growing, modes.eigenvalues)]
+    return _among(spectrum.eigenvalues, model, modes, searched=True)
+
+
+def _counted_among_all(model: LinearModel, modes: ModeSet, *, searched: bool) -> FoundModes:
+    """The modes with what grows beside them among all eigenvalues, which take less than a count along the axis."""
+    with one_thread():
+        return _among(eigenvalues(model), model, modes, searched=searched)
+
+
+def _among(values: Vector, model: LinearModel, modes: ModeSet, *, searched: bool) -> FoundModes:
+    """The modes with what grows beside them among all eigenvalues of the model."""
+    growing = values[grows(values)]
+    known = [
+        np.abs(modes.eigenvalues - one).min(initial=np.inf) <= _ONE * abs(one) for one in growing
+    ]
+    others = growing[~np.array(known, dtype=bool)]
     fastest = complex(others[np.argmax(others.real)]) if len(others) else None
-    zeros = int((np.abs(spectrum.eigenvalues) <= ZERO).sum()) - model.clocks
-    return FoundModes(modes, True, int((1 + (others.imag > 0)).sum()), fastest, zeros)
+    zeros = int((np.abs(values) <= ZERO).sum()) - model.clocks
+    return FoundModes(modes, searched, int((1 + (others.imag > 0)).sum()), fastest, zeros)
 
 
 def _elsewhere(equations: ShiftedEquations, alone: Vector, found: ModeSet) -> int:

@@ -1,8 +1,10 @@
 """A screening: operating points times outages, in stretches that are computed, kept, and joined."""
 
+import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import cast
 
 from orchestrator.cases.case import Case, with_protection
@@ -21,8 +23,11 @@ from orchestrator.studies.screening.record import ItemRecord, StretchRecord
 from orchestrator.studies.screening.request import ScreeningRequest
 from orchestrator.systems.coupling.no_trip_regions import NoTripCode
 
-# operating points with outages that are computed one from the other before the next full search
+# most operating points with outages that are computed one from the other before the next full search
 STRETCH = 48
+
+# from so many on they are two stretches at least, so that two cores have work
+WORTH_TWO = 13
 
 
 @dataclass(frozen=True)
@@ -66,8 +71,7 @@ def plan_screening(case: Case, request: ScreeningRequest) -> ScreeningPlan:
     besides = {} if runs is None else {"relays": repr(read.prepared.relays)}
     study = StudyCase.of(read.prepared, read.layers, request.step_size, **besides)
     tasks = []
-    for first in range(0, len(read.items), STRETCH):
-        part = read.items[first : first + STRETCH]
+    for part in _stretches(read.items):
         point = read.points[part[0].point]
         anchor = Item(part[0].point, 0, point.values, point.out)
         tasks.append(
@@ -84,6 +88,15 @@ def plan_screening(case: Case, request: ScreeningRequest) -> ScreeningPlan:
             )
         )
     return ScreeningPlan(**vars(read), wanted=region, tasks=tuple(tasks))
+
+
+def _stretches(items: Sequence[Item]) -> Iterator[tuple[Item, ...]]:
+    """Stretches of about the same length: how many does not depend on who computes them."""
+    count = len(items)
+    parts = max(2 if count >= WORTH_TWO else 1, math.ceil(count / STRETCH))
+    edges = [count * k // parts for k in range(parts + 1)]
+    for first, last in pairwise(edges):
+        yield tuple(items[first:last])
 
 
 @dataclass(frozen=True)

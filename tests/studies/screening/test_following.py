@@ -63,6 +63,32 @@ def test_a_neighbours_modes_become_those_of_the_model():
     assert np.sort_complex(found.values) == pytest.approx(np.sort_complex(expected), rel=1e-8)
 
 
+def test_modes_that_a_fast_state_shows_enlarged_are_refined_until_they_fit():
+    """An amplifier of 1 ms and a gain of 200 has 1e5 of what the vectors lack, after the values stand still."""
+    fast = np.zeros((DENSE + 41, DENSE + 41))
+    there, here = system(KNOWN), system([value * (1.02 + 0.01j) for value in KNOWN], seed=1)
+    models = []
+    for model in (there, here):
+        A = fast.copy()
+        A[:-1, :-1] = model.A
+        A[-1, :-1], A[-1, -1] = 2e5, -1e3
+        models.append(LinearModel.from_matrix(A, (*model.names, "c.amplifier"), None))
+    start = columns(modes_of(models[0]))
+    found = refine(models[1], ShiftedEquations(models[1]), start.values, start.left, start.right)
+    assert found.settled
+    expected = modes_of(models[1]).eigenvalues
+    assert np.sort_complex(found.values) == pytest.approx(np.sort_complex(expected), rel=1e-8)
+
+
+def test_vectors_that_never_fit_are_not_taken_for_modes(monkeypatch):
+    """Planted: no round more than the values need."""
+    monkeypatch.setattr("orchestrator.linear.spectra.mode_refinement._REST", 1e-18)
+    model = system(KNOWN)
+    start = columns(modes_of(model))
+    found = refine(model, ShiftedEquations(model), start.values, start.left, start.right)
+    assert not found.settled
+
+
 @pytest.mark.parametrize("k", range(5))
 def test_a_mode_that_is_not_known_is_found(k):
     model = system(KNOWN)
@@ -90,16 +116,27 @@ def test_nothing_is_searched_where_nothing_is_lost():
     assert found.growing_elsewhere is None
 
 
+@pytest.mark.parametrize("most_states", [0, 4000])
 @pytest.mark.parametrize("outside", [0.5 + 80j, 3 + 0.1j, 2 + 4000j])
-def test_growth_at_other_frequencies_is_counted(outside, monkeypatch):
-    """A full matrix of a few states takes the way of a large sparse one."""
+def test_growth_at_other_frequencies_is_counted(outside, most_states, monkeypatch):
+    """A full matrix of a few states takes the way of a large sparse one, and that of a middling one."""
     monkeypatch.setattr("orchestrator.studies.screening.modes.DENSE", 0)
+    monkeypatch.setattr("orchestrator.studies.screening.modes._MOST_STATES", most_states)
     here = system([*KNOWN, outside], n=40)
     found = find_modes_here(
         here, -np.linspace(1.0, 900.0, len(here.names)), REGION, modes_of(here), count=True
     )
     assert found.growing_elsewhere == 2
     assert found.grows
+    assert found.fastest == (pytest.approx(outside, rel=1e-6) if most_states else None)
+
+
+def test_growth_within_the_range_is_not_counted_twice():
+    before, here = modes_of(system(KNOWN)), system([0.3 + 3j, *KNOWN[1:], 1 + 80j])
+    found = find_modes_here(here, np.zeros(0), REGION, before, count=True)
+    assert (found.modes.eigenvalues.real > 0).sum() == 1
+    assert found.growing_elsewhere == 2
+    assert found.slowest == 0
 
 
 def test_growing_eigenvalues_are_counted():

@@ -481,8 +481,20 @@ def test_parts_merged_are_the_whole_to_the_last_bit(gfor, day, tmp_path, monkeyp
         assert (tmp_path / "merged" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
+@pytest.mark.parametrize(
+    ("count", "lengths"),
+    [(1, [1]), (12, [12]), (21, [10, 11]), (96, [48, 48]), (100, [33, 33, 34])],
+)
+def test_two_cores_have_work(count, lengths):
+    """Stretches are of one length, whoever computes them, and none is lost."""
+    items = [study.Item(k, 0, {}, (), ()) for k in range(count)]
+    parts = list(study._stretches(items))
+    assert list(map(len, parts)) == lengths
+    assert [item for part in parts for item in part] == items
+
+
 def test_a_part_without_a_stretch_is_merged(gfor, day, tmp_path):
-    """Up to 48 points with outages form one stretch, so the second part of two has nothing to compute."""
+    """Up to 12 points with outages form one stretch, so the second part of two has nothing to compute."""
     common = ("screen", "two_area", "--scenario", "gfor", "--points", day, "--workers", "1")
     parts = [tmp_path / f"part{k}" for k in (1, 2)]
     for k, part in enumerate(parts, start=1):

@@ -146,6 +146,7 @@ def test_an_item_is_stable_only_where_all_growth_was_counted(
     monkeypatch, tmp_path, counted, stable
 ):
     monkeypatch.setattr("orchestrator.studies.screening.modes.DENSE", 0)
+    monkeypatch.setattr("orchestrator.studies.screening.modes._MOST_STATES", 0)
     if not counted:
         monkeypatch.setattr("orchestrator.studies.screening.modes._elsewhere", lambda *_: None)
     path = tmp_path / "points.csv"
