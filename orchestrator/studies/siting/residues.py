@@ -12,6 +12,7 @@ from fmus.grid.names import injection_names
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Matrix, Vector
 from orchestrator.core.errors import InputError
+from orchestrator.linear.models.hub_elimination import hub_equations
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.linearization import Blocks
 from orchestrator.linear.models.state_space import StateSpace, state_space
@@ -149,6 +150,9 @@ def _through_others(
         )
         given = np.vstack([drive, np.zeros((1, drive.shape[1]))])
         return np.asarray(np.linalg.solve(bordered, given)[:n])
+    found = _by_hub(model, z, left, right, drive)
+    if found is not None:
+        return found
     equations = [
         [z * sp.eye_array(n) - model.F, -model.G, sp.csc_array(right[:, None])],
         [-model.H, sp.eye_array(m) - model.K, None],
@@ -157,3 +161,25 @@ def _through_others(
     given = np.zeros((n + m + 1, drive.shape[1]), dtype=complex)
     given[:n] = drive
     return np.asarray(spla.splu(sp.block_array(equations, format="csc")).solve(given)[:n])
+
+
+def _by_hub(
+    model: LinearModel, z: complex, left: Vector, right: Vector, drive: Matrix
+) -> Vector | None:
+    """The same by blocks and a hub; None where the model has no hub, a block has an eigenvalue at z, or nothing swings.
+
+    The mode and its conjugate are held by two real wires each way, as the blocks are real: lᴴ·x = 0 and lᵀ·x = 0. What
+    the conjugate mode gives is added behind."""
+    rows, columns = (np.vstack([part.real, part.imag]) for part in (left, right))
+    held = hub_equations(
+        model.F,
+        sp.csr_array(sp.hstack([model.G, columns.T])),
+        H=sp.csr_array(sp.vstack([model.H, rows])),
+        K=sp.csr_array(sp.block_diag([model.K, sp.eye_array(2)])),
+    )
+    factors = held.at(complex(z)) if held is not None and z.imag else None
+    if factors is None:
+        return None
+    found = factors.solve(-drive.astype(complex))
+    beside = (left @ drive) / ((z - z.conjugate()) * np.vdot(left, right).conjugate())
+    return np.asarray(found + np.outer(right.conj(), beside))
