@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from orchestrator.core.arrays import Complex
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.continuation import pair_of
 from orchestrator.linear.spectra.modes import (
@@ -123,12 +124,17 @@ def _unlikeness(one: Mode, other: Mode) -> float:
 
 
 def extremes(model: LinearModel) -> tuple[complex, complex | None]:
-    """The least damped eigenvalue from 0.1 to 2 Hz (−1 if no eigenvalue lies there), and the fastest growing one
-    [rad/s]."""
+    """`weakest_and_growing` of a model."""
     values, _ = to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
+    return weakest_and_growing(values, step_map=model.step_size is not None)
+
+
+def weakest_and_growing(values: Complex, *, step_map: bool) -> tuple[complex, complex | None]:
+    """The least damped eigenvalue from 0.1 to 2 Hz (−1 if no eigenvalue lies there), and the fastest growing one
+    [rad/s], of all eigenvalues."""
     low, high = ELECTROMECHANICAL_HZ
     hertz = values.imag / (2 * np.pi)
     weakest = min(
         values[(hertz >= low) & (hertz <= high)].tolist(), key=damping_ratio, default=complex(-1)
     )
-    return weakest, fastest_growth(values, step_map=model.step_size is not None)
+    return weakest, fastest_growth(values, step_map=step_map)

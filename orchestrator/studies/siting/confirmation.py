@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import AnalysisError, CosimError
@@ -15,11 +16,11 @@ from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.linearization import Blocks
 from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.linear.spectra.continuation import Eigenpair, pairs_near
-from orchestrator.linear.spectra.modes import Mode, damping_percent, damping_ratio, find_modes
+from orchestrator.linear.spectra.modes import Mode, damping_percent, damping_ratio, oscillations
 from orchestrator.studies.modes.modes import modes_from, running
 from orchestrator.studies.pod_design.closed_loop import Placed, PodLoop, PodSetting
-from orchestrator.studies.pod_design.guard import extremes
 from orchestrator.studies.pod_design.lead_lag import LARGEST_TURN, NO_COMPENSATION, lead_lag_turning
+from orchestrator.studies.siting.least_damping import GROWS, LeastDamping
 from orchestrator.studies.siting.placing import STAGES, name_at, response_of
 from orchestrator.studies.siting.residues import SeenMode
 from orchestrator.systems.coupling.master import Master
@@ -116,17 +117,22 @@ def confirmed(
     frequency_range: tuple[float, float],
     controller: str | None,
     gain: float,
+    *,
+    known: Sequence[Mode] = (),
 ) -> Confirmation:
     """Compare a mode's predicted shift with that of the coupled FMUs.
 
     ``prepared``: With the device at the bus.
+    ``known``: modes of the system without it.
     ``controller``: ``pod_p`` or ``pod_q``, of at most a gain [pu of the rating]; None for a device as it is."""
     try:
         with running(prepared) as master:
             if controller is None:
                 return _as_it_is(prepared, master, bus, seen, frequency_range)
             find_operating_point(master)
-            return _with_pod(master, bus, seen, frequency_range, controller, gain)
+            return _with_pod(
+                master, bus, seen, frequency_range, controller=controller, gain=gain, known=known
+            )
     except CosimError as error:
         return Confirmation(bus, failure=str(error))
 
@@ -153,8 +159,10 @@ def _with_pod(
     bus: str,
     seen: SeenMode,
     frequency_range: tuple[float, float],
+    *,
     controller: str,
     gain: float,
+    known: Sequence[Mode],
 ) -> Confirmation:
     name, eigenvalue = name_at(bus), seen.mode.eigenvalue
     loop = PodLoop(master, [name], controller)
@@ -169,13 +177,13 @@ def _with_pod(
     by_gain = shift(PodSetting(1.0, NO_COMPENSATION))
     if not by_gain:
         raise AnalysisError("a POD there does not move the mode at all")
-    tuned, search = tuned_setting(loop, start, by_gain, eigenvalue, gain)
+    looks = LeastDamping(loop, known)
+    tuned, search = tuned_setting(loop, start, by_gain, eigenvalue, gain, looks=looks)
     trial = trial_of(tuned, by_gain, eigenvalue)
     predicted = shift(trial)
     coupled = loop.place(start, trial.gain, trial.filters).eigenvalue - start.eigenvalue
     reached = loop.place(start, tuned.gain, tuned.filters)
-    modes = find_modes(loop.model(tuned), *frequency_range)
-    least = least_damped(modes, reached.eigenvalue)
+    least = least_of(looks.all_values(tuned), frequency_range, reached.eigenvalue)
     stable = loop.examine(tuned).stability.stable
     return Confirmation(
         bus,
@@ -196,7 +204,13 @@ def _predicted(master: Master, model: ComponentLinearization, bus: str, seen: Se
 
 
 def tuned_setting(
-    loop: PodLoop, start: Placed, by_gain: complex, eigenvalue: complex, most: float
+    loop: PodLoop,
+    start: Placed,
+    by_gain: complex,
+    eigenvalue: complex,
+    most: float,
+    *,
+    looks: LeastDamping | None = None,
 ) -> tuple[PodSetting, SearchEnd]:
     """The setting with the best least damping: around the angle that the residue asks for, with gains up to the most.
 
@@ -209,15 +223,18 @@ def tuned_setting(
         for turn in _TURNS
         if abs(angle + turn) < LARGEST_TURN * STAGES
     ]
-    worth = {}
-    for setting in settings:
-        weakest, growing = extremes(loop.model(setting))
-        worth[setting] = -1.0 if growing is not None else damping_ratio(weakest)
-    top = max(worth.values())
-    equal = [one for one in settings if worth[one] > max(top - _GIVEN_UP, -1.0)] or settings
-    of_followed = {one: _of_followed(loop, start, one) for one in equal}
-    best = min(equal, key=lambda one: (-round(of_followed[one] / _EQUAL), one.gain))
-    return best, _search_end(best, settings, worth, most)
+    seen = looks or LeastDamping(loop)
+    worth = {setting: seen.of(setting) for setting in settings}
+    while True:
+        top = max(worth.values())
+        equal = [one for one in settings if worth[one] > max(top - _GIVEN_UP, GROWS)] or settings
+        of_followed = {one: _of_followed(loop, start, one) for one in equal}
+        best = min(equal, key=lambda one: (-round(of_followed[one] / _EQUAL), one.gain))
+        deciding = [max(settings, key=lambda one: worth[one]), best, *_next_larger(best, settings)]
+        unsure = [one for one in dict.fromkeys(deciding) if not seen.is_sure(one)]
+        if not unsure:
+            return best, _search_end(best, settings, worth, most)
+        worth |= {one: seen.surely(one) for one in unsure}
 
 
 def trial_of(tuned: PodSetting, by_gain: complex, eigenvalue: complex) -> PodSetting:
@@ -237,12 +254,16 @@ def _of_followed(loop: PodLoop, start: Placed, setting: PodSetting) -> float:
 def _search_end(
     best: PodSetting, settings: Sequence[PodSetting], worth: Mapping[PodSetting, float], most: float
 ) -> SearchEnd:
+    for following in _next_larger(best, settings):
+        least = worth[following]
+        return SearchEnd(most, following.gain, None if least <= GROWS else least)
+    return SearchEnd(most)
+
+
+def _next_larger(best: PodSetting, settings: Sequence[PodSetting]) -> list[PodSetting]:
+    """The setting with the next larger gain and the same lead/lag; none if the largest gain is the best."""
     larger = [one for one in settings if one.gain > best.gain and one.filters == best.filters]
-    if not larger:
-        return SearchEnd(most)
-    following = min(larger, key=lambda one: one.gain)
-    least = worth[following]
-    return SearchEnd(most, following.gain, None if least <= -1 else least)
+    return sorted(larger, key=lambda one: one.gain)[:1]
 
 
 def same_mode(mode: Mode, model: LinearModel) -> Eigenpair:
@@ -265,6 +286,16 @@ def same_mode(mode: Mode, model: LinearModel) -> Eigenpair:
 
 
 def least_damped(modes: Sequence[Mode], followed: complex) -> complex:
-    """The least damped oscillation of the range [rad/s]; the mode that is followed counts also beside the range."""
+    """The least damped oscillation of a range's modes [rad/s]; the one that is followed always counts."""
     found = [mode.eigenvalue for mode in modes if mode.is_oscillation]
     return min([*found, followed], key=damping_ratio)
+
+
+def least_of(
+    values: NDArray[np.complex128], frequency_range: tuple[float, float], followed: complex
+) -> complex:
+    """The same of all eigenvalues [rad/s]."""
+    low, high = (2 * math.pi * hertz for hertz in frequency_range)
+    inside = oscillations(values) & (low <= values.imag) & (values.imag <= high)
+    held: list[complex] = values[inside].tolist()
+    return min([*held, followed], key=damping_ratio)

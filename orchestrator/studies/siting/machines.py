@@ -15,17 +15,18 @@ from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.linearization import Blocks
 from orchestrator.linear.models.state_space import StateSpace, state_space
 from orchestrator.linear.models.steady_state import find_operating_point
-from orchestrator.linear.spectra.modes import Mode, damping_percent, find_modes
+from orchestrator.linear.spectra.modes import Mode, damping_percent
 from orchestrator.studies.modes.modes import ModesResult, modes_from, running
 from orchestrator.studies.pod_design.closed_loop import Placed, PodLoop, PodSetting
 from orchestrator.studies.pod_design.lead_lag import NO_COMPENSATION
 from orchestrator.studies.siting.confirmation import (
     Confirmation,
-    least_damped,
+    least_of,
     same_mode,
     trial_of,
     tuned_setting,
 )
+from orchestrator.studies.siting.least_damping import LeastDamping
 from orchestrator.studies.siting.placing import STAGES
 from orchestrator.studies.siting.study import SiteRequest
 from orchestrator.systems.coupling.system import ComponentPlan
@@ -251,12 +252,13 @@ def _confirmed(result: MachineSites, machine: str, scenario: str) -> Confirmatio
             if not by_gain:
                 raise AnalysisError("a POD there does not move the mode at all")
             s = start.eigenvalue
-            tuned, search = tuned_setting(loop, start, by_gain, s, request.gain)
+            looks = LeastDamping(loop)
+            tuned, search = tuned_setting(loop, start, by_gain, s, request.gain, looks=looks)
             turned = by_gain * tuned.filters.response(s)
             trial = trial_of(tuned, by_gain, s)
             coupled = loop.place(start, trial.gain, trial.filters).eigenvalue - s
             reached = loop.place(start, tuned.gain, tuned.filters)
-            modes = find_modes(loop.model(tuned), *request.frequencies)
+            values = looks.all_values(tuned)
             return Confirmation(
                 machine,
                 predicted=trial.gain * turned,
@@ -264,7 +266,7 @@ def _confirmed(result: MachineSites, machine: str, scenario: str) -> Confirmatio
                 with_device=s,
                 setting=tuned,
                 tuned=reached.eigenvalue,
-                least=least_damped(modes, reached.eigenvalue),
+                least=least_of(values, request.frequencies, reached.eigenvalue),
                 stable=loop.examine(tuned).stability.stable,
                 search=search,
             )

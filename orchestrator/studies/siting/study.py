@@ -356,9 +356,16 @@ def _with_confirmations(
     found = []
     for k, bus in enumerate(result.ranking[: request.confirm]):
         prepared = _prepared(placing.with_devices(result.case, device, [bus]), request, scenario)
-        found.append(
-            confirmed(prepared, bus, seen, request.frequencies, request.controller, request.gain)
+        one = confirmed(
+            prepared,
+            bus,
+            seen,
+            request.frequencies,
+            request.controller,
+            request.gain,
+            known=result.intact.found.modes,
         )
+        found.append(one)
         report(k + 1)
     result = replace(result, confirmations=tuple(found))
     return _by_coupled(result) if result.by_coupled else result

@@ -48,7 +48,7 @@ def least_damped(damping):
 def planted(monkeypatch, case, **found):
     """The result with confirmations that are given: by bus the damping with the device, and with its POD [%]."""
 
-    def confirmed(prepared, bus, *_):
+    def confirmed(prepared, bus, *_, **__):
         alone, tuned, stable = found[bus]
         if tuned is None:
             return Confirmation(bus, failure="no steady state")

@@ -1,0 +1,97 @@
+"""The least damping of a system with one setting of a POD after the other.
+
+Of a system with few states all eigenvalues are computed with each setting. In a large one the swings are followed from
+setting to setting, which says what grows among them, and nothing of what grows elsewhere: all eigenvalues are computed
+with those settings that decide."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.core.errors import AnalysisError
+from orchestrator.core.threads import one_thread
+from orchestrator.linear.spectra.followed_swings import (
+    follow_swings,
+    search_swings,
+    swings_among,
+    weakest_swing,
+)
+from orchestrator.linear.spectra.mode_refinement import RefinedModes
+from orchestrator.linear.spectra.modes import Mode, damping_ratio, eigenvalues
+from orchestrator.linear.spectra.stability import fastest_growth
+from orchestrator.studies.pod_design.closed_loop import PodLoop, PodSetting
+from orchestrator.studies.pod_design.guard import weakest_and_growing
+from orchestrator.studies.pod_design.lead_lag import NO_COMPENSATION
+
+GROWS = -1.0  # in the place of a damping ratio, where something grows
+
+MOST_WHOLE = 1000
+"""Up to this number of states all eigenvalues are computed with each setting, which takes a second; with 3,000 it takes
+six, and following the swings two to four."""
+
+
+class LeastDamping:
+    """Least damping ratios by setting.
+
+    ``known``: modes of the system without the device, from which those with it are followed."""
+
+    def __init__(self, loop: PodLoop, known: Sequence[Mode] = ()) -> None:
+        self._loop, self._known = loop, known
+        self._swings: dict[PodSetting, RefinedModes] = {}
+        self._whole: dict[PodSetting, NDArray[np.complex128]] = {}
+        self._found: dict[PodSetting, float] = {}
+
+    def of(self, setting: PodSetting) -> float:
+        """The least damping ratio from 0.1 to 2 Hz, `GROWS` where something is seen to grow."""
+        if setting not in self._found:
+            model = self._loop.model(setting)
+            swings = None if len(model.names) <= MOST_WHOLE else self._followed(setting)
+            weakest = None if swings is None else weakest_swing(swings)
+            if swings is None or weakest is None:
+                return self.surely(setting)
+            grows = fastest_growth(swings.values, step_map=model.step_size is not None) is not None
+            self._found[setting] = GROWS if grows else damping_ratio(weakest)
+        return self._found[setting]
+
+    def surely(self, setting: PodSetting) -> float:
+        """The same with growth at any frequency, by all eigenvalues."""
+        is_map = self._loop.model(setting).step_size is not None
+        weakest, growing = weakest_and_growing(self.all_values(setting), step_map=is_map)
+        self._found[setting] = GROWS if growing is not None else damping_ratio(weakest)
+        return self._found[setting]
+
+    def is_sure(self, setting: PodSetting) -> bool:
+        """Tell whether growth at any frequency is known, or that something grows."""
+        return setting in self._whole or self._found.get(setting) == GROWS
+
+    def all_values(self, setting: PodSetting) -> NDArray[np.complex128]:
+        """All eigenvalues [rad/s]."""
+        if setting not in self._whole:
+            with one_thread():
+                self._whole[setting] = eigenvalues(self._loop.model(setting))
+        return self._whole[setting]
+
+    def _followed(self, setting: PodSetting) -> RefinedModes | None:
+        """The swings from those of the nearest smaller gain with the same lead/lag; None where only all eigenvalues
+        show them."""
+        if setting not in self._swings:
+            before = self._nearest(setting)
+            model = self._loop.model(setting)
+            found = None if before is None else follow_swings(model, before)
+            try:
+                self._swings[setting] = search_swings(model) if found is None else found
+            except AnalysisError:
+                return None
+        return self._swings[setting]
+
+    def _nearest(self, setting: PodSetting) -> RefinedModes | None:
+        if not setting.gain:
+            return swings_among(self._known, self._loop.model(setting)) if self._known else None
+        alike = [
+            one
+            for one in self._swings
+            if one.filters == setting.filters and 0 < one.gain < setting.gain
+        ]
+        nearest = max(alike, key=lambda one: one.gain, default=PodSetting(0.0, NO_COMPENSATION))
+        return self._followed(nearest)
