@@ -8,6 +8,7 @@ from orchestrator.linear.spectra.mode_tracking import ModeSet, match
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.simulation.watch.settings import left_changed
 from orchestrator.studies.modes.modes import ModesResult, compute_modes
+from orchestrator.studies.operating_points.columns import Elements
 
 
 def lasting_changes(prepared: PreparedScenario) -> Mapping[str, float | bool]:
@@ -30,7 +31,7 @@ def modes_after(
 ) -> ModesResult | str | None:
     """The modes from a power flow with what the events leave changed; the reason where there are none beside a switch
     that is left, else None. Units share what loads and references change, which no power flow tells."""
-    values = lasting_changes(prepared)
+    values = _with_other_ends(prepared, lasting_changes(prepared))
     if not values or prepared.beside is None:
         return None
     shared = [key for key in values if key.endswith(".scale") or ".delta_" in key]
@@ -44,3 +45,18 @@ def modes_after(
             reason = ": ".join(line.strip(" -:") for line in str(error).splitlines()[:2])
     is_switched = any(isinstance(value, bool) for value in values.values())
     return f"the modes after the events are not known: {reason}" if is_switched else None
+
+
+def _with_other_ends(
+    prepared: PreparedScenario, values: Mapping[str, float | bool]
+) -> Mapping[str, float | bool]:
+    """The values with both stations of a DC line out of service where one is: its line carries nothing any more."""
+    if prepared.network is None:
+        return values
+    further = {
+        key.replace(f"{lost}.connected", f"{other}.connected"): False
+        for lost, other in Elements.of(prepared).other_ends.items()
+        for key, value in values.items()
+        if value is False and f".{key}".endswith(f".{lost}.connected")
+    }
+    return {**values, **further}

@@ -11,8 +11,10 @@ from orchestrator.core.errors import CaseError
 from orchestrator.linear.models.coupled_state import CoupledState
 from orchestrator.linear.models.linear_model import HELD
 from orchestrator.linear.models.linearization import Blocks, compose, continuous
+from orchestrator.studies.modes.modes import ModesResult, compute_modes
 from orchestrator.studies.operating_points.columns import Elements
 from orchestrator.studies.operating_points.outages import read_outages, what_remains
+from orchestrator.studies.runs.after_events import modes_after
 from orchestrator.systems.coupling.master import Master
 from tests.cases.networks.psse import raw, records
 from tests.cases.networks.psse.test_devices import lines_of
@@ -412,6 +414,25 @@ def test_an_outage_of_each_unit_takes_a_dc_line_once(prepared):
     for kind in ("units", "n-1"):
         names = " ".join(outage.name for outage in read_outages(kind, elements))
         assert names.count("dc_TIE_1") == 1
+
+
+@pytest.mark.parametrize("lost", [RECTIFIER, INVERTER])
+def test_after_the_trip_of_a_station_the_modes_are_those_without_its_line(prepared, tmp_path, lost):
+    """Planted before: the other station alone was refused, as no line can start so."""
+    trip = f'events = [{{ type = "unit_trip", time = "0.2 s", unit = "{lost}" }}]\n'
+    prepared()
+    text = (tmp_path / "case.toml").read_text()
+    (tmp_path / "case.toml").write_text(
+        text.replace("[scenarios.plain]\n", f"[scenarios.plain]\n{trip}")
+    )
+    after = modes_after(prepare_one(tmp_path / "case.toml", None, {}), (0.1, 2.0))
+    both = {f"{end}__connected": False for end in (RECTIFIER, INVERTER)}
+    expected = compute_modes(prepared(**both))
+    assert isinstance(after, ModesResult)
+    assert [m.eigenvalue for m in after.modes] == pytest.approx(
+        [m.eigenvalue for m in expected.modes], rel=1e-6
+    )
+    assert not any(RECTIFIER in name or INVERTER in name for name in after.model.names)
 
 
 def test_a_run_in_which_the_rectifier_trips_is_kept(gfor, prepared, tmp_path):
