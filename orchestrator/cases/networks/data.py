@@ -34,7 +34,13 @@ from orchestrator.cases.networks.conversion import (
 )
 from orchestrator.cases.networks.element_names import BranchName
 from orchestrator.cases.networks.imported_flow import imported_equations
-from orchestrator.cases.networks.load_models import FlowLaws, device_laws, flow_laws, with_laws
+from orchestrator.cases.networks.load_models import (
+    FlowLaws,
+    device_laws,
+    flow_laws,
+    is_told,
+    with_laws,
+)
 from orchestrator.cases.networks.psse.dc_line_models import SolvedLine, solved_lines
 from orchestrator.cases.networks.psse.device_flow import SolvedDevices, solved_devices
 from orchestrator.cases.networks.psse.device_notes import device_notes
@@ -121,6 +127,9 @@ class NetworkData:
     # records of dynamics data
     file_loads: tuple[FileLoad, ...] = ()
     recorded_loads: frozenset[str] = frozenset()
+    told_loads: frozenset[str] = (
+        frozenset()
+    )  # names of those that the source's parts tell as a whole
     controls: tuple[Control, ...] = ()  # taps and shunts that move in the power flow of an outage
     counted_controls: str = ""  # how many could move, in words
     sequences: SequenceData | None = None  # of the negative and the zero sequence, from a file
@@ -193,6 +202,7 @@ def network_data(
         misfit=found.misfit,
         file_voltages=found.file_voltages,
         flow_laws=_laws_of_flow(source),
+        told_loads=_told_loads(source),
         limits=_limits(table, source),
         records=tuple(records),
         titles=source.titles,
@@ -225,6 +235,12 @@ def _ends_of(lines: Sequence[Line], transformers: Sequence[ThreeWinding]) -> dic
     """The buses at the ends of branches, which a network has that lists none."""
     ends = [bus for line in lines for bus in (line.from_bus, line.to_bus)]
     return dict.fromkeys([*ends, *(bus for x in transformers for bus in x.buses)])
+
+
+def _told_loads(source: ImportedNetwork) -> frozenset[str]:
+    """Names of the loads that the source tells part by part."""
+    parts = source.load_parts
+    return frozenset(x.name for x in source.loads if is_told(x, parts.get(x.name, (0j, 0j))))
 
 
 def _laws_of_flow(source: ImportedNetwork) -> dict[str, FlowLaws]:

@@ -14,6 +14,9 @@ _NAMES = {zip_: name for name, zip_ in LAWS.items()}
 # of a part by the whole: above, the parts cancel, and the whole is none to take shares of
 _LARGEST_SHARE = 100.0
 
+# part of a load that its parts may leave over by rounding
+_LITTLE = 1e-6
+
 _OPEN = (
     "the load model is open: the file's loads (constant powers in its power flow) are taken as constant impedances, as "
     "ANDES does by itself (in eigenvalues since 1.9; before, they are constant powers there) and stability studies in "
@@ -55,13 +58,19 @@ def _name_of(law: Zip | None) -> str:
     )
 
 
-def open_question(
-    table: NetworkTable | None, loads: Sequence[Load], recorded: Collection[str], place: str
-) -> list[Problem]:
-    """Ask how loads follow the voltage of which neither the case nor a record says it.
+def is_told(load: Load, parts: tuple[complex, complex]) -> bool:
+    """Return whether a source's constant impedances and currents [MW, Mvar] are the whole load, with nothing open."""
+    rest = complex(load.p_mw, load.q_mvar) - sum(parts)
+    return any(parts) and abs(rest) <= _LITTLE * max(map(abs, parts))
 
-    ``recorded``: names of loads with a record."""
-    asked = is_open(table) and any(x.p_mw > 0 and x.name not in recorded for x in loads)
+
+def open_question(
+    table: NetworkTable | None, loads: Sequence[Load], told: Collection[str], place: str
+) -> list[Problem]:
+    """Ask how loads follow the voltage of which neither the case nor the source says it.
+
+    ``told``: names of loads with a record, or with parts that are the whole load."""
+    asked = is_open(table) and any(x.p_mw > 0 and x.name not in told for x in loads)
     return [Problem(place, _OPEN)] if asked else []
 
 

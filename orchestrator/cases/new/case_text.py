@@ -125,12 +125,17 @@ class CaseText:
             "change"
         )
         base = self._base
-        if base is None or not base.recorded_loads:
+        if base is None or not base.recorded_loads | base.told_loads:
             return asked
         recorded, network = base.recorded_loads, base.network
+        told = base.told_loads - recorded
         names = {load.name for load in network.loads} if network else set()
-        rest = f"; the others: {asked}" if names - recorded else ""
-        return f"{len(recorded)} as their records in the DYR file say; [network] load_model goes before{rest}"
+        said = [f"{len(told)} as IP, IQ, YP and YQ of the RAW file say"] if told else []
+        if recorded:
+            records = f"{len(recorded)} as their records in the DYR file say"
+            said.append(f"{records}; [network] load_model goes before")
+        said += [f"the others: {asked}"] if names - recorded - told else []
+        return "; ".join(said)
 
     def _path(self, path: Path) -> str:
         """Return a path as the file names it: relative where that is possible, with slashes everywhere."""

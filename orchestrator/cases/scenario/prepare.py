@@ -111,6 +111,7 @@ class PreparedScenario:
     names: ElementNames = field(default_factory=ElementNames)  # of the network's file, for people
     regions: Regions = field(default_factory=Regions)  # area, zone, … of the buses in the file
     recorded_loads: frozenset[str] = frozenset()  # loads whose laws are of records of dynamics data
+    told_loads: frozenset[str] = frozenset()  # loads that the network's source tells part by part
     # likely ratings [MVA] of units whose S_n is only the base of their data
     base_ratings: Mapping[str, float] = field(default_factory=dict)
     following_loads: tuple[str, ...] = ()  # loads that follow the voltage in an outage's power flow
@@ -331,7 +332,10 @@ class Preparer:
         data = draft.data or NetworkData()
         loads = draft.network.loads if draft.network else ()
         draft.found.questions += open_question(
-            draft.given.case.network, loads, data.recorded_loads, draft.given.place("network")
+            draft.given.case.network,
+            loads,
+            data.recorded_loads | data.told_loads,
+            draft.given.place("network"),
         )
         draft.found.questions += [
             *doubts(draft.given.case, draft.given.place),
@@ -373,6 +377,7 @@ class Preparer:
             names=_names(draft),
             regions=data.regions,
             recorded_loads=data.recorded_loads,
+            told_loads=data.told_loads,
             base_ratings=draft.base_ratings,
             following_loads=tuple(data.flow_laws),
             moving=tuple(control.variable for control in data.controls),

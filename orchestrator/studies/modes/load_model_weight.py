@@ -48,7 +48,8 @@ def _weight(
     network = result.prepared.case.table.network
     prepared = result.prepared
     loads = prepared.network.loads if prepared.network else ()
-    if not is_open(network) or not {load.name for load in loads} - prepared.recorded_loads:
+    told = prepared.recorded_loads | prepared.told_loads
+    if not is_open(network) or not {load.name for load in loads} - told:
         return 0.0, ""
     states = result.model.number_of_states
     if states > _MOST_STATES:

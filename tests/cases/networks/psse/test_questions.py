@@ -464,6 +464,26 @@ def test_an_open_load_model_is_asked_about(questions):
     assert "the load model is open" in asked
 
 
+@pytest.mark.parametrize(("parts", "is_open"), [((1.0, 1.0), False), ((0.9, 1.0), True)])
+def test_a_load_model_that_the_file_says_part_by_part_is_not_asked_about(questions, parts, is_open):
+    """P as constant current and Q as constant admittance, as in WECC's reduced system; with a rest it is open."""
+    at, written, section = {}, [], "bus"
+    for line in RAW.splitlines():
+        cells = line.split(",")
+        if line.startswith("0 /"):
+            section = line.partition("BEGIN")[2].strip()
+        elif section == "bus" and len(cells) > 8 and cells[0].strip().isdigit():
+            at[int(cells[0])] = float(cells[7])
+        elif section.startswith("LOAD") and float(cells[5]):
+            v, (p, q) = at[int(cells[0])], map(float, cells[5:7])
+            current, admittance = parts[0] * p / v, -parts[1] * q / v**2
+            rest = [(1 - parts[0]) * p, (1 - parts[1]) * q]
+            cells[5:11] = map(repr, [*rest, current, 0.0, 0.0, admittance])
+        written.append(",".join(cells))
+    asked = questions(raw="\n".join(written) + "\n", case=OPEN)
+    assert ["the load model is open" in text for text in asked] == ([True] if is_open else [])
+
+
 @pytest.mark.parametrize("law", ["impedance", "current", "power"])
 def test_a_load_model_that_the_case_says_is_not_asked_about(questions, law):
     assert questions(case=CASE.replace('"power"', f'"{law}"')) == []
