@@ -201,7 +201,7 @@ def test_a_drag_estimates_and_its_release_gives_the_figures_of_the_copied_comman
         view.mouse.move(middle[0] - 2 * step, middle[1])
         view.wait_for_timeout(60)
     view.wait_for_selector("#map .estimate", state="attached")
-    assert "estimate at gfor.pod_p.K" in view.locator("#verdict").inner_text()
+    assert "(estimated by ∂λ/∂p)" in view.locator("#verdict").inner_text()
     assert rows(view)[0][0].startswith("≈")
     guess = float(rows(view)[0][1].removeprefix("≈ "))
     view.mouse.up()

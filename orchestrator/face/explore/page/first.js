@@ -124,7 +124,7 @@ async function searchWith(name, percent) {
   box.querySelector("details")?.setAttribute("open", "");
   box.scrollIntoView({ block: "nearest" });
   sayElse(`${name} is tried ${percent === null ? "until the system is unstable" : `until the least damped mode has ${percent} %`} …`);
-  const show = await one.search(percent, false), button = make("button", {}, "show it");
+  const show = await one.search(percent, false, words => sayElse(`${name}: ${words}`)), button = make("button", {}, "show it");
   button.addEventListener("click", () => show());
   const now = leastOf(seen.modes), here = now && percent !== null ? `now ${fixed(now.damping_percent, 2)} % at ${number(state.values[name] ?? original(name))}; ` : "";
   sayElse(`${name}: ${here}${one.said.innerText.replaceAll("\nalso ", "; also ").replaceAll(" set", "").split("\n")[0]} `, show ? button : "");

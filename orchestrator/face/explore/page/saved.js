@@ -44,7 +44,9 @@ async function dragSaved(name, value) {
   paintMap(); paintTable();
   const least = [...between].sort((a, b) => a.damping - b.damping)[0];
   $("verdict").className = "estimated";
-  $("verdict").textContent = `${name} = ${number(value)}, between computed values: least damped ≈ ${fixed(least.hz, 3)} Hz, ${fixed(least.damping, 2)} % (halfway it is off by ${number(cell.least, 2)} points${cell.hertz === undefined ? "" : ` and ${fixed(cell.hertz, 4)} Hz`}, any drawn mode by at most ${number(cell.most, 2)}${cell.least > cell.most ? "; a mode that is not drawn is damped least there" : ""}); computed on release`;
+  const most = `any drawn mode by at most ${number(cell.most, 2)}${cell.least > cell.most ? "; a mode that is not drawn is damped least there" : ""}`;
+  const off = `${number(cell.least, 2)} points${cell.hertz === undefined ? "" : ` and ${fixed(cell.hertz, 4)} Hz`}`;
+  $("verdict").textContent = estimated(name, value, least, 2, `between computed values, halfway off by ${off}, ${most}`);
   painted(begin, "estimate");
 }
 // The followed modes of a cell, on straight lines between its corners.

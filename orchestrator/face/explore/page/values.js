@@ -123,14 +123,20 @@ function finderOf(key, spec) {
   if (others !== one.of) { one.of = others; one.said.replaceChildren(); }
   return one.box;
 }
+// Where the least damped mode has so many percent, to first order, by what is known of ∂λ/∂p; null where nothing is.
+function nearBy(name, percent) {
+  const one = seen.moversOf === state.scenario && !seen.moversStale ? seen.movers?.movers.find(mover => mover.parameter === name) : null;
+  const x = one ? one.value + (percent - seen.movers.damping_percent) * one.step / one.points : NaN;
+  return Number.isFinite(x) && x >= (one.minimum ?? -Infinity) && x <= (one.maximum ?? Infinity) && x * one.value > 0 ? x : null;
+}
 function finder({ now, bounds, valuesAt, apply, words }) {
-  const wanted = make("input", { value: 5, size: 3, inputmode: "decimal", "aria-label": `damping in % that ${words} is looked for` }), said = make("span", { class: "soft block", role: "status" }), begin = make("button", {}, "find"), until = make("button", { title: "the whole spectrum, aperiodic growth too" }, "until unstable");
+  const names = Object.keys(valuesAt(1)), wanted = make("input", { value: 5, size: 3, inputmode: "decimal", "aria-label": `damping in % that ${words} is looked for` }), said = make("span", { class: "soft block", role: "status" }), begin = make("button", {}, "find"), until = make("button", { title: "the whole spectrum, aperiodic growth too" }, "until unstable");
   const say = text => { said.textContent = text; };
-  const search = async (percent, sets = true) => {  // null: until unstable
+  const search = async (percent, sets = true, tell = () => {}) => {  // null: until unstable; `tell` hears the first answers
     if (percent !== null && Number.isFinite(percent)) wanted.value = percent;
     if (!(percent === null || (percent > -100 && percent < 100))) { say("give a damping in percent"); return; }
     const here = now(), [least, most] = bounds(), error = make("span"), cancels = seen.cancels, tried = [];
-    const holds = one => { const damping = Math.min(100, ...one.modes.map(m => m.damping_percent)); return { damping, f: percent === null ? { true: 1, false: -1 }[one.stable] ?? null : (one.stable === false ? Math.min(damping, -1e-9) : damping) - percent }; };
+    const holds = one => { const damping = Math.min(100, ...one.modes.map(m => m.damping_percent)); if (percent !== null) { const f = (one.stable === false ? Math.min(damping, -1e-9) : damping) - percent; return { damping, f, g: f }; } const f = { true: 1, false: -1 }[one.stable] ?? null; return { damping, f, g: damping * f > 0 ? damping : null }; };
     let stopped = "";
     const at = async x => {  // null where nothing is known, and where the search ends
       say(`${words} ${number(x, 6)} …, ${tried.length} values tried`);
@@ -148,40 +154,49 @@ function finder({ now, bounds, valuesAt, apply, words }) {
       }
       return null;
     };
-    const first = await at(here), edges = [];
+    const byDerivative = nearBy(names.length === 1 ? names[0] : null, percent ?? 0);
+    if (byDerivative !== null) tell(`about ${number(byDerivative, 3)} by ∂λ/∂p at ${number(here)} (≈); being computed …`);
+    const first = await at(here), edges = [], crossings = [];
     if (!first) { say(stopped || error.textContent); return; }
-    for (const values of ladders(here, least, most)) {
-      let last = first;
-      for (const x of values) {
-        const point = await at(x);
-        if (stopped) { say(stopped); return; }
-        if (point) { last = point; continue; }
-        let edge = { x, why: error.textContent };
-        for (let k = 0; k < HALVES_TO_AN_EDGE; k++) {
-          const middle = +((last.x + edge.x) / 2).toPrecision(6), beside = await at(middle);
-          if (stopped) { say(stopped); return; }
-          if (beside) last = beside; else edge = { x: middle, why: error.textContent };
-        }
-        edges.push(`not computed from ${number(edge.x)} on: ${reasonOf(edge.why)}`);
-        break;
-      }
-    }
-    const line = [...tried].sort((a, b) => a.x - b.x), range = `${line.length} values were tried from ${number(line[0].x)} to ${number(line.at(-1).x)}`, tail = ["", range, ...edges].join("; ");
-    const crossings = [];
-    for (let k = 1; k < line.length; k++) {
-      let a = line[k - 1], b = line[k];
-      if (a.f < 0 === b.f < 0) continue;
-      for (let n = 0; n < 40; n++) {  // to 0.00 %: by secants, every third time by halves
-        const good = a.f >= 0 ? a : b, part = percent === null || n % 3 === 2 ? 0.5 : Math.min(0.95, Math.max(0.05, (a.f - 0.002) / (a.f - b.f)));
-        const x = +(a.x + part * (b.x - a.x)).toPrecision(6);
+    const text = ({ good, bad }) => (percent === null ? `stable ${bad.x > good.x ? "up" : "down"} to ${words} ${number(good.x, 6)}, UNSTABLE at ${number(bad.x, 6)}${bad.verdict.includes("cause: the coupling") ? ", by the communication step and not by the system" : ""}: ${bad.verdict.replace(/^UNSTABLE: /, "")}`
+      : `${fixed(good.damping, 2)} % at ${words} ${number(good.x, 6)}; ${bad.x > good.x ? "above" : "below"} it is less than ${number(percent)} %${bad.f < -percent ? " (unstable)" : ""}`);
+    // Between two points of which one holds: to 0.00 %, or to 2e-4 of the value; by secants, every third time by halves.
+    const crossingIn = async (a, b) => {
+      for (let n = 0; n < 40 && !stopped; n++) {
+        const good = a.f >= 0 ? a : b, secant = a.g !== null && b.g !== null && n % 3 !== 2;
+        let part = secant ? (a.g - (percent === null ? 0 : 0.002)) / (a.g - b.g) : 0.5;
+        if (secant && percent === null) part += (part < 0.5 ? 1 : -1) * 8e-5 * Math.abs(a.x / (b.x - a.x));  // a little beyond, so that both ends come close
+        const x = +(a.x + Math.min(0.999, Math.max(0.001, part)) * (b.x - a.x)).toPrecision(6);
         if ((percent !== null && good.f < 0.004) || x === a.x || x === b.x || (percent === null && Math.abs(b.x - a.x) < 2e-4 * Math.abs(b.x))) break;
         const point = await at(x);
-        if (stopped) { say(stopped); return; }
         if (!point) break;
         if (point.f < 0 === a.f < 0) a = point; else b = point;
       }
-      crossings.push(a.f >= 0 ? { good: a, bad: b } : { good: b, bad: a });
+      const found = a.f >= 0 ? { good: a, bad: b } : { good: b, bad: a };
+      crossings.push(found);
+      if (crossings.length === 1 && !stopped) tell(`${text(found)}; others are looked for …`);
+    };
+    // Upwards and downwards in turn, so that the nearest comes first; what changes between neighbours is found at once.
+    const sides = ladders(here, least, most).map(values => ({ values, last: first }));
+    const walk = async (side, x) => {
+      const point = await at(x), before = side.last;
+      if (point) { side.last = point; if (point.f < 0 !== before.f < 0) await crossingIn(before, point); }
+      return point;
+    };
+    while (sides.some(side => side.values.length)) for (const side of sides.filter(one => one.values.length)) {
+      const x = side.values.shift(), point = await walk(side, x);
+      if (stopped) { say(stopped); return; }
+      if (point) continue;
+      let edge = { x, why: error.textContent };
+      for (let k = 0; k < HALVES_TO_AN_EDGE; k++) {
+        const middle = +((side.last.x + edge.x) / 2).toPrecision(6), beside = await walk(side, middle);
+        if (stopped) { say(stopped); return; }
+        if (!beside) edge = { x: middle, why: error.textContent };
+      }
+      edges.push(`not computed from ${number(edge.x)} on: ${reasonOf(edge.why)}`);
+      side.values = [];
     }
+    const line = [...tried].sort((a, b) => a.x - b.x), range = `${line.length} values were tried from ${number(line[0].x)} to ${number(line.at(-1).x)}`, tail = ["", range, ...edges].join("; ");
     if (!crossings.length) {
       const best = line.reduce((a, b) => (Math.abs(b.f) < Math.abs(a.f) ? b : a));
       say((percent !== null ? `not reached; nearest: ${fixed(best.damping, 2)} % at ${number(best.x)}` : `${first.f > 0 ? "stable" : "UNSTABLE"} over the whole range, ${words} from ${number(line[0].x)} to ${number(line.at(-1).x)}`) + tail);
@@ -189,8 +204,6 @@ function finder({ now, bounds, valuesAt, apply, words }) {
     }
     const far = ({ good: { x } }) => (percent === null && here > 0 ? (x > 0 ? Math.abs(Math.log(x / here)) : Infinity) : Math.abs(x - here));
     crossings.sort((a, b) => far(a) - far(b));
-    const text = ({ good, bad }) => (percent === null ? `stable ${bad.x > good.x ? "up" : "down"} to ${words} ${number(good.x, 6)}, UNSTABLE at ${number(bad.x, 6)}${bad.verdict.includes("cause: the coupling") ? ", by the communication step and not by the system" : ""}: ${bad.verdict.replace(/^UNSTABLE: /, "")}`
-      : `${fixed(good.damping, 2)} % at ${words} ${number(good.x, 6)}; ${bad.x > good.x ? "above" : "below"} it is less than ${number(percent)} %${bad.f < -percent ? " (unstable)" : ""}`);
     if (percent !== null && sets) await apply(crossings[0].good.x);
     said.replaceChildren(...crossings.flatMap((one, k) => {
       const button = make("button", {}, "set");
@@ -201,7 +214,7 @@ function finder({ now, bounds, valuesAt, apply, words }) {
   };
   begin.addEventListener("click", () => search(Number(wanted.value.trim().replace(",", ".") || NaN)));
   until.addEventListener("click", () => search(null));
-  const names = Object.keys(valuesAt(1)), others = () => JSON.stringify([state.scenario, state.range, Object.entries(state.values).filter(([name]) => !names.includes(name)).sort()]);
+  const others = () => JSON.stringify([state.scenario, state.range, Object.entries(state.values).filter(([name]) => !names.includes(name)).sort()]);
   return { said, search, others, of: others(), box: make("div", { class: "finder" }, make("label", {}, "least damped at ", wanted, " % "), begin, " or ", until, said) };
 }
 
@@ -243,9 +256,11 @@ function estimateAt(name, value) {
   paintMap(); paintTable();
   const least = modes.filter(Boolean).sort((a, b) => a.damping - b.damping)[0];
   $("verdict").className = "estimated";
-  if (least) $("verdict").textContent = `estimate at ${name} = ${number(value)}: least damped ≈ ${fixed(least.hz, 3)} Hz, ${fixed(least.damping, 1)} %; exact on release`;
+  if (least) $("verdict").textContent = estimated(name, value, least, 1, "by ∂λ/∂p");
   painted(begin, "estimate");
 }
+// The verdict while a slider is dragged, in a live page and in a saved one.
+const estimated = (name, value, least, digits, how) => `${name} = ${number(value)}: least damped ≈ ${fixed(least.hz, 3)} Hz, ${fixed(least.damping, digits)} % (estimated ${how}); computed on release`;
 // How long it took from the input until the map was painted.
 function painted(begin, what) {
   requestAnimationFrame(() => setTimeout(() => {
