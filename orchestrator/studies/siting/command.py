@@ -27,7 +27,9 @@ def _computed(case: Case, request: SiteRequest, report: Callable[[int, int], Non
 
 
 def _parts(found: Found) -> Iterator[RenderableType]:
-    yield from map(escape, (found.answer, *found.remarks))
+    first, *behind = found.answer_lines
+    yield f"[bold]{escape(first)}[/]"
+    yield from map(escape, (*behind, *found.remarks))
     yield ""
     yield found.best_table()
     yield ""

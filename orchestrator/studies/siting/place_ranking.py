@@ -71,6 +71,11 @@ class PlaceRanking(ABC, Generic[Ranked]):
         """The best places in one sentence."""
 
     @property
+    def answer_lines(self) -> list[str]:
+        """The answer as a terminal shows it: the verdict in its first line, and what belongs to it behind."""
+        return [self.answer]
+
+    @property
     @abstractmethod
     def remarks(self) -> list[str]:
         """Return what coupled FMUs say of the best places, and what was not judged."""

@@ -60,6 +60,12 @@ class Siting(PlaceRanking[SiteResult]):
         return answer(self.result)
 
     @property
+    def answer_lines(self) -> list[str]:
+        """The best place, and behind it what the other places bring."""
+        first, further = answer_in_parts(self.result)
+        return [first, _as_sentence(further)] if further else [first]
+
+    @property
     def remarks(self) -> list[str]:
         """Return what coupled FMUs say of the best places, which modes these do not reach, and what was not judged."""
         return [*sureness(self.result), *remarks(self.result)]
@@ -144,12 +150,14 @@ def _best_confirmed(result: SiteResult, among: str) -> tuple[str, str]:
     by_support = sorted(result.ranking, key=lambda bus: -result.least(bus)[0])
     small = ", ".join(f"{bus} {shift_text(result, result.least(bus)[0])}" for bus in by_support[:3])
     order = f"the order of the {len(result.confirmations)} places that coupled FMUs computed"
-    steps = f"{seen.mode.damping_percent:.2f} % → {first.damping:.2f} %"
-    mode = f"the mode {title_of_mode(seen.label, seen.mode)}, the least damped without it"
-    reached = f"{steps} for {mode}, with {_rated(result)}{pod}"
+    before = seen.mode.damping_percent
+    lower = first.other is not None and damping_percent(first.other) < before
+    but = f", but {least_then(first, before)}" if lower else ""
+    steps = f"{before:.2f} % → {first.damping:.2f} % for {title_of_mode(seen.label, seen.mode)}"
     return (
-        f"{first.bus} is the best place for {device_title(result)}{among}: {reached}{_lowered(result, first)}",
-        f"; then {then}: {order}. By {unit(result, '100')} it is {small}",
+        f"{first.bus} is the best place for {device_title(result)}{among}: {steps}{but}",
+        f"; this is the least damped mode without it, with {_rated(result)}{pod}; then {then}: {order}. "
+        f"By {unit(result, '100')} it is {small}",
     )
 
 
@@ -157,13 +165,6 @@ def _as_sentence(part: str) -> str:
     """Let a part behind a semicolon stand alone."""
     text = part.removeprefix("; ")
     return text[:1].upper() + text[1:]
-
-
-def _lowered(result: SiteResult, first: Confirmation) -> str:
-    """Return the least damped mode of all at the best place, which may have less than the least before."""
-    before = result.intact.modes[0].mode.damping_percent
-    lower = first.other is not None and damping_percent(first.other) < before
-    return f"{', but' if lower else ';'} {least_then(first, before)}"
 
 
 def title_of_mode(label: str, mode: Mode) -> str:

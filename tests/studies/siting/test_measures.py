@@ -84,8 +84,11 @@ def test_the_headline_ranks_as_the_confirmation_does(five, monkeypatch):
     seen = found.intact.modes[0].mode
     at, before = f"{seen.frequency_hz:.3f} Hz", f"{seen.damping_percent:.2f} %"
     assert said.startswith("bus_15 is the best place for POD-P of those asked for: ")
-    assert f"for: {before} → 9.64 % for the mode {at}, the least damped without it, " in said
-    assert "least damped then is another mode: 1.746 Hz, 7.50 %" in said.partition("; then ")[0]
+    first, further = Siting(found).answer_lines
+    worse = f"another mode: 1.746 Hz, 7.50 %, LESS than the least before, {before}"
+    assert first.endswith(f"for: {before} → 9.64 % for {at}, but least damped then is {worse}")
+    assert further.startswith("This is the least damped mode without it, with the device of ")
+    assert "least damped then" not in further
     assert "then bus_12 9.30 %, bus_11 8.13 %" in said
     assert said.rpartition("it is ")[2].startswith("bus_11 +")
     assert [bus["bus"] for bus in as_json(found)["buses"]] == list(found.ranking)
