@@ -2,10 +2,16 @@
 
 import json
 import re
+from pathlib import Path
 
 import pytest
 
 import orchestrator as gfor
+from orchestrator.face.explore.files import whole_page
+from orchestrator.output.report.html import elements
+from orchestrator.studies.immittance import ratio_page
+from tests.benchmarks import wasm
+from tests.benchmarks.live_pages import pages_with_answers
 from tests.output.report.test_html import CHROMIUM, OPTIONS
 from tests.pages.markdown import ROOT, links
 
@@ -43,6 +49,39 @@ def test_a_page_is_small_and_asks_nothing_of_the_network(path):
     )
 
 
+def test_the_explorers_pages_are_those_that_todays_code_writes_around_what_they_hold():
+    """Pages were once patched in their text, and told a verdict in other words than the live page."""
+    held = pages_with_answers()
+    assert len(held) >= 5
+    old = [
+        path.name
+        for path, content in held.items()
+        if whole_page(content) != path.read_text("utf-8")
+    ]
+    assert old == [], "python -m tests.benchmarks.live_pages --put"
+
+
+@pytest.mark.parametrize(
+    ("name", "texts"),
+    [
+        ("design", [elements.__file__]),
+        ("source", [elements.__file__]),
+        ("weak_grid", [elements.__file__, ratio_page.__file__]),
+        ("converter_in_browser", [wasm.__file__]),
+    ],
+)
+def test_styles_and_scripts_of_other_pages_are_todays(name, texts):
+    page = (ROOT / ".docs" / "live" / f"{name}.html").read_text(encoding="utf-8")
+    for module in map(Path, texts):
+        beside = [
+            path
+            for path in module.parent.glob("*.*s*")
+            if path.suffix in (".css", ".js") and path.stem in ("page", module.stem)
+        ]
+        assert beside
+        assert [path.name for path in beside if path.read_text(encoding="utf-8") not in page] == []
+
+
 @pytest.mark.parametrize("name", ["two_area"])
 def test_the_figures_are_those_of_today(name):
     held = saved(ROOT / ".docs" / "live" / f"{name}.html")
@@ -76,6 +115,22 @@ def test_every_question_of_a_page_is_asked_by_tab_and_enter():
     assert "What is a mode?" in asked
     assert len(asked) >= 3
     assert "A mode is one of the ways in which the system swings" in answer
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
+def test_no_page_is_wider_than_the_smallest_telephone():
+    """A path in a heading, and the buttons beside the tabs, once were."""
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as tools:
+        browser = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        view = browser.new_page(viewport={"width": 320, "height": 800})
+        wide = {}
+        for path in PAGES:
+            view.goto(path.as_uri())
+            view.wait_for_function("document.body.innerText.length > 300")
+            wide[path.name] = view.evaluate("document.documentElement.scrollWidth")
+        browser.close()
+    assert {name: width for name, width in wide.items() if width > 320} == {}
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
