@@ -29,9 +29,14 @@ class LargeLoop(Loop):
     def __init__(self, other, elsewhere=lambda K: 0.1):
         super().__init__(other)
         self._elsewhere = elsewhere
-        self.components = 0
+        self._models = {}
 
     def model(self, setting):
+        if setting not in self._models:
+            self._models[setting] = self._mixed(setting)
+        return self._models[setting]
+
+    def _mixed(self, setting):
         pairs = zip((self.SWING, self.OTHER), self.dampings(setting), strict=True)
         blocks = [swing(w, zeta) for w, zeta in pairs]
         blocks.append(swing(16 * np.pi, self._elsewhere(setting.gain)))
