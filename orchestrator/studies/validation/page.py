@@ -27,6 +27,7 @@ from orchestrator.studies.validation.words import (
     open_sentence,
     sentence,
     untold_words,
+    worst_of,
     yardstick_sentence,
 )
 
@@ -57,9 +58,10 @@ def validation_page(result: ValidationResult) -> str:
         chapters.append(("Fit", _fit(result)))
     chapters.append(("Procedure, and what was not judged", _not_judged(result)))
     verdict = "no verdict: no limits were given" if result.verdict is None else str(result.verdict)
-    said = error_sentence(result.comparisons)
-    says = [f"Limits: {verdict}.", f"{device.name}: {said}."]
-    says.append(yardstick_sentence(result.comparisons))
+    of_both = [*result.comparisons, *result.others]
+    worst = worst_of(of_both).device.name
+    says = [f"Limits: {verdict}.", f"{worst}: {error_sentence(of_both)}."]
+    says.append(yardstick_sentence(of_both))
     left = open_sentence(result.criteria, result.devices)
     says += [f"{left}."] if left else []
     places = [one for one in result.apart if one.more_than_from_record]

@@ -173,8 +173,13 @@ def _of_run(dataset: xr.Dataset, place: str | None, label: str) -> xr.Dataset:
         place = "gfor" if "gfor" in buses else None
     if place is None and len(buses) == 1:
         (place,) = buses
+    if not buses:
+        raise InputError(
+            f"{label}: the run holds no unit's current with its bus's voltage; run the case again with "
+            "'record = [\"*\"]' in its [solver]"
+        )
     if place is None or place not in buses:
-        known = ", ".join(buses) or "none: run it with 'record = [\"*\"]'"
+        known = ", ".join(buses)
         raise InputError(
             f"{label}: it is a run with several units; give "
             + Option.PLACE

@@ -43,6 +43,7 @@ from orchestrator.studies.validation.words import (
     swing_cell,
     untold_words,
     value_text,
+    worst_of,
     yardstick_sentence,
 )
 
@@ -278,17 +279,16 @@ def _differences(result: ValidationResult) -> Iterator[str]:
 
 def _answer(found: Validation) -> str:
     result = found.result
-    says = error_sentence(result.comparisons)
+    of_both = [*result.comparisons, *result.others]
+    name = worst_of(of_both).device.name
+    says = error_sentence(of_both)
     if result.verdict is None:
-        beside = yardstick_sentence(result.comparisons)
-        said = (
-            f"{result.request.device.name}: {says}. {beside} Without --limits there is no verdict."
-        )
-        return escape(said)
+        beside = yardstick_sentence(of_both)
+        return escape(f"{name}: {says}. {beside} Without --limits there is no verdict.")
     left = open_sentence(result.criteria, result.devices)
     says += f"; {left}" if left else ""
     word = {"met": "MET", "not met": "NOT MET", "open": "OPEN"}[str(result.verdict)]
-    return VerdictSentence(_GOOD[result.verdict], word, says).markup(result.request.device.name)
+    return VerdictSentence(_GOOD[result.verdict], word, says).markup(name)
 
 
 def _events_table(result: ValidationResult) -> PlainTable:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from orchestrator.core.errors import number_of
 from orchestrator.core.options import Option
 from orchestrator.studies.validation.beside import WindowApart
 from orchestrator.studies.validation.causes import CauseKind, Explanation
@@ -400,14 +401,14 @@ def untold_words(one: FittedParameter) -> str:
 _UNITS = {"p": "MW", "q": "Mvar"}
 
 
-def _worst(comparisons: Sequence[EventComparison]) -> EventComparison:
-    """The event with the largest error of P or Q."""
+def worst_of(comparisons: Sequence[EventComparison]) -> EventComparison:
+    """The event, and of two models the one, with the largest error of P or Q."""
     return max(comparisons, key=lambda each: each.largest_error[2].max_error)
 
 
 def error_sentence(comparisons: Sequence[EventComparison]) -> str:
     """Say how large the largest error of P or Q is, and where."""
-    one = _worst(comparisons)
+    one = worst_of(comparisons)
     window, signal, figures = one.largest_error
     size = (
         f"{figures.max_error:.3g} pu ({figures.max_error * one.device.rating:.3g} {_UNITS[signal]})"
@@ -423,7 +424,7 @@ def error_sentence(comparisons: Sequence[EventComparison]) -> str:
 
 def yardstick_sentence(comparisons: Sequence[EventComparison]) -> str:
     """Lay the errors of the worst event beside its own swing and beside what the recording leaves open."""
-    one = _worst(comparisons)
+    one = worst_of(comparisons)
     swings = swings_of(one)
     seen = [f"{name.upper()} by {_off(swing)}" for name, swing in swings.items() if swing.seen]
     still = [name.upper() for name, swing in swings.items() if not swing.seen]
@@ -578,9 +579,9 @@ def _cause(one: Explanation) -> str:
 
 
 def refused_sentence(refused: Sequence[RefusedTrial]) -> str:
-    """Name what was tried and did not run."""
-    names = "; ".join(one.tried for one in refused)
-    return f"Tried, and the device did not run so: {names}. JSON and the page say why."
+    """Count what was tried and did not run: it says little, and nothing vanishes."""
+    many = number_of(len(refused), "trial")
+    return f"{many} of other readings or values did not run; JSON and the page name them."
 
 
 def fit_sentence(fit: Fit, kept_back: Sequence[str]) -> str:

@@ -1,10 +1,12 @@
 """Two models of one plant beside one recording: the phasor model and the EMT model."""
 
 import json
+from dataclasses import replace
 
 import orchestrator as gfor_in_python
 from orchestrator.studies.validation.beside import models_apart
 from orchestrator.studies.validation.limits import EXAMPLE
+from orchestrator.studies.validation.view import Validation, parts
 from orchestrator.studies.validation.words import difference_sentence
 from tests.studies.validation.recordings import run, table, with_noise, written
 
@@ -46,3 +48,22 @@ def test_models_that_differ_more_from_each_other_than_from_the_record_are_told()
     assert ("after", "p") in {(one.window, one.signal) for one in places}
     assert "differ from each other more than from the record" in difference_sentence(places)
     assert not any(one.more_than_from_record for one in models_apart(*2 * first.comparisons))
+
+
+def test_the_first_line_names_the_model_with_the_larger_error():
+    recording = with_noise(table(run("pod_p", gfor__pod_p__K=120.0))).set_index("time")
+    of_gains = {
+        gain: gfor_in_python.validate("gfor_phasor", recording, values=ON | {"pod_p.K": gain})
+        for gain in (120.0, 180.0)
+    }
+    right, wrong = (found.result for found in of_gains.values())
+    named = [replace(one.device, name="wrong") for one in wrong.comparisons]
+    others = [replace(one, device=of) for one, of in zip(wrong.comparisons, named, strict=True)]
+    said = [
+        one
+        for one in parts(Validation(replace(right, others=others)))
+        if "largest error" in str(one)
+    ]
+    (first,) = map(str, said)
+    assert first.startswith("wrong: the largest error")
+    assert f"{wrong.comparisons[0].largest_error[2].max_error:.3g} pu" in first
