@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 
 from fmus.toolchain.cache import cache_directory, intact, keep, key_of
@@ -150,9 +151,8 @@ def compile_for(source: str, target: str, ending: str, libraries: Sequence[str] 
     try:
         c_file, built = folder / "source.c", folder / f"library{ending}"
         c_file.write_text(source, encoding="utf-8")
-        compiler = [sys.executable, "-m", "ziglang", "cc", "-target", target]
         command = [
-            *compiler,
+            *(str(_zig()), "cc", "-target", target),
             *flags,
             str(c_file),
             "-o",
@@ -168,6 +168,15 @@ def compile_for(source: str, target: str, ending: str, libraries: Sequence[str] 
         return keep(library, built.read_bytes())
     finally:
         remove(folder)
+
+
+@cache
+def _zig() -> Path:
+    """The compiler itself: ``python -m ziglang`` starts it too, and costs the start of a Python each time."""
+    spec = find_spec("ziglang")
+    assert spec is not None
+    assert spec.origin is not None
+    return Path(spec.origin).with_name("zig")
 
 
 def _flags(target: str, ending: str) -> list[str]:

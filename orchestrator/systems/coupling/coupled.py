@@ -15,7 +15,8 @@ from orchestrator.core.closing import Closing
 from orchestrator.core.errors import ComponentError, InputError
 from orchestrator.devices.fmi.archive import extract
 from orchestrator.devices.fmi.component import Component, RealBatch
-from orchestrator.devices.fmi.instance import open_component
+from orchestrator.devices.fmi.instance import is_ours, open_component
+from orchestrator.devices.fmi.unpacked import unpacked
 from orchestrator.systems.coupling.clock import Clock
 from orchestrator.systems.coupling.compiled_loop import apart
 from orchestrator.systems.coupling.connections import Endpoint
@@ -87,12 +88,19 @@ class CoupledComponents(Closing):
         for name, plan in self.system.components.items():
             path = plan.description.path
             if path not in folders:
-                folders[path] = extract(path)
-                self._release.callback(remove_tree, folders[path])
+                folders[path] = self._unpacked(path)
             component = opener(name, plan, folders[path])
             self._release.enter_context(component)
             self.components[name] = component
             _begin(component, plan, stop_time)
+
+    def _unpacked(self, path: Path) -> Path:
+        """The folder of an FMU's files, until the release."""
+        if is_ours(path):
+            return self._release.enter_context(unpacked(path))
+        folder = extract(path)
+        self._release.callback(remove_tree, folder)
+        return folder
 
     def restart(self, system: System) -> None:
         """Bring the same FMUs to another common start, as if they were new."""

@@ -37,6 +37,8 @@ from orchestrator.studies.points.failure import Failure
 ROOT = Path(__file__).parents[3]
 
 OPTION = re.compile(r"(?<![\w/\\-])--[a-z][a-z-]*[a-z]")
+# a file that has none of these need not be parsed, which takes seconds for all of them
+MAY_NAME_ONE = re.compile(r"--[a-z\"'{]")
 SURFACES = (
     "face/cli/",
     "face/agents/",
@@ -198,7 +200,10 @@ def options_of_commands() -> set[str]:
 
 def options_in(path: Path) -> list[int]:
     """Return lines of texts that name an option in plain words, in a file of the program."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    text = path.read_text(encoding="utf-8")
+    if not MAY_NAME_ONE.search(text):
+        return []
+    tree = ast.parse(text)
     declared = {
         id(inner)
         for node in ast.walk(tree)

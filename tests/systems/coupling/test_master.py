@@ -8,6 +8,7 @@ import pytest
 from fmpy.fmi2 import FMU2Slave
 
 from orchestrator.core.errors import ComponentError, InputError
+from orchestrator.devices.fmi import unpacked
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.systems.coupling import compiled_loop as loops
 from orchestrator.systems.coupling.clock import Clock
@@ -36,10 +37,12 @@ def inner_loop(request, monkeypatch):
 
 @pytest.fixture
 def temporary(tmp_path, monkeypatch):
-    """An empty folder where temporary folders are made."""
+    """An empty folder where temporary folders are made; none is kept for a later system, nor from an earlier one."""
     folder = tmp_path / "temporary"
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    monkeypatch.setattr(unpacked, "_folders", {})
+    monkeypatch.setattr(unpacked, "_MOST_UNUSED", 0)
     return folder
 
 
