@@ -49,6 +49,10 @@ _HELD_AFTER = (
 )
 _HELD_BEFORE = 0.5  # part before it, the same [s]
 _LITTLE = 0.05  # part of the plant's movement (rms) by which a model that is in step may be off
+_MUCH = 0.25
+"""Part of the plant's movement (rms) that a cause may leave: one that leaves more of a model that fell out of step may
+only keep it from falling, as a large reactance does."""
+
 _MOST_EVENTS = 3  # those with the largest errors
 _WORSE = 1.2  # times the squared error: a position that leaves more at a first look is none
 _GAIN = re.compile(r"[Kk][^a-z]?.*|.*gain.*")  # last part of the name of a controller's gain
@@ -66,11 +70,23 @@ def explain_errors(
     error, causes are tried while the device is held in step. Of long recordings the first seconds of the events with
     the largest errors are looked at. Ctrl-C leaves the causes that were found until then."""
     found = _search(device, in_step or events, report)
-    if found.explains or not found.finished or not _misses_much(device, events):
+    enough = found.explains and found.causes[0].left <= _MUCH * _movement(events)
+    if enough or not found.finished or not _misses_much(device, events):
         return found
     short = [cut_event(one, _HELD_AFTER, _HELD_BEFORE) for one in events]
     other = _search(device.in_step, short, report, _plain_error(device, short))
-    return replace(other if other.explains else found, finished=other.finished)
+    taken = other if other.explains and _leaves_less(other, found) else found
+    return replace(taken, finished=other.finished)
+
+
+def _movement(events: Sequence[RecordedEvent]) -> float:
+    """The rms movement of P and Q after the events' begins [pu of the rating]."""
+    return float(np.sqrt(np.mean([np.hypot(*rms_movement(one)) ** 2 for one in events])))
+
+
+def _leaves_less(one: CauseSearch, other: CauseSearch) -> bool:
+    """Return whether one search's first cause leaves less than that of another, where that explains anything."""
+    return not other.explains or one.causes[0].left < other.causes[0].left
 
 
 def _misses_much(device: PlayedDevice, events: Sequence[RecordedEvent]) -> bool:

@@ -111,6 +111,17 @@ def test_a_cause_that_leaves_clearly_more_than_the_first_explains_nothing():
     assert without_worse_ways([right, replace(right, value=0.2, left=0.001)]) == [right]
 
 
+def test_a_large_reactance_that_keeps_a_model_from_falling_is_no_cause_of_all():
+    """The plant's axes are limited to 0.95 pu, the model's to 1.1: beside that, the model falls out of step."""
+    limits = {f"gfor__voltage_control__i_{axis}_max": 0.95 for axis in "dq"}
+    frame = with_noise(table(run("pod_p", stop=3.0, scale=1.12, **limits))).set_index("time")
+    found = gfor_in_python.validate("gfor", frame, values=ON, step="500 us", explain=True).result
+    best = found.explanations[0]
+    assert found.explained_in_step
+    assert best.name in {"voltage_control.i_d_max", "voltage_control.i_q_max"}
+    assert best.value == pytest.approx(0.95, rel=0.03)
+
+
 def test_a_wrong_droop_is_named_though_what_the_samples_do_not_hold_makes_most_of_the_error():
     """A record of 1 kHz does not hold how the voltage jumps, and the converter rings with it."""
     frame = with_noise(table(run("pod_p", stop=4.0, gfor__droop__R_f=0.048)))
