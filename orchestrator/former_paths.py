@@ -73,9 +73,36 @@ _RENAMED = {
     "output.results.recorded": "output.results.recording_reader",
     "output.results.recording": "output.results.recording_writer",
     "output.results.storage": "output.results.file_writers",
-    "cases.networks.psse.known_records": "cases.networks.psse.record_catalogue",
+    "cases.networks.psse.known_records": "cases.networks.psse.dyr_model_list",
+    "cases.networks.psse.records": "cases.networks.psse.raw_records",
+    "cases.networks.psse.records_of_units": "cases.networks.psse.dyr_unit_records",
+    "cases.networks.psse.record_values": "cases.networks.psse.dyr_values",
+    "cases.networks.psse.record_doubts": "cases.networks.psse.dyr_questions",
+    "cases.networks.psse.record_catalogue": "cases.networks.psse.dyr_model_list",
+    "face.explore.between": "face.explore.interpolation",
+    "studies.validation.between": "studies.validation.between_samples",
+    "output.results.columns": "output.results.xarray_columns",
+    "studies.operating_points.columns": "studies.operating_points.point_columns",
 }
 """Modules on the floors that had another name there."""
+
+_OF_FMI = {
+    "devices.sandbox": "answers=answer_forms confined=foreign_process confinement=access_restriction "
+    "dll_process dll_reading=dll_reading_process dll_worker=dll_process_worker "
+    "limits=resource_limits linux=kernel_calls mailbox process_tree protection=protections_in_force "
+    "seccomp=system_call_filter supervisor wine wine_program",
+    "devices.fmi": "bound=bound_component converted=converted_component "
+    "devices=device_or_controller isolation=isolated_component "
+    "isolation_worker=isolated_component_worker loaded=loaded_component port=port_mapping "
+    "refusal=refused_calls turn=interpreter_turn",
+    "core": "interrupts",
+}
+"""Present room → the modules that had another place or name in ``devices.fmi``; ``former=present`` where it changed."""
+
+for _room, _names in _OF_FMI.items():
+    for _name in _names.split():
+        _former, _, _present = _name.partition("=")
+        _RENAMED[f"devices.fmi.{_former}"] = f"{_room}.{_present or _former}"
 
 _HERE = __package__
 
@@ -109,7 +136,8 @@ def _present_case_module(inside: str) -> str | None:
         for name in names.split():
             former, _, present = name.partition("=")
             if former == module:
-                return ".".join(filter(None, (_HERE, "cases", room, present or former, rest)))
+                on_floor = ".".join(filter(None, ("cases", room, present or former, rest)))
+                return f"{_HERE}.{_RENAMED.get(on_floor, on_floor)}"
     return None
 
 

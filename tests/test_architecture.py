@@ -23,6 +23,7 @@ FLOORS = {
             "late",
             "read_only",
             "given_files",
+            "interrupts",
             "spelling",
             "threads",
             "uncollected",
@@ -33,7 +34,7 @@ FLOORS = {
         ("asked", "attributes", "foreign_files", "question_kinds"),
         ("safe_files", "toml_files", "truth"),
     ),
-    "devices": (("fmi",), ("binding",), ("acceptance",)),
+    "devices": (("sandbox",), ("fmi",), ("binding",), ("acceptance",)),
     "systems": (("coupling",), ("ssp",)),
     "linear": (("models",), ("spectra",), ("doubts", "signals")),
     "cases": (
@@ -220,9 +221,9 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
         "orchestrator.systems.coupling.compiled_loop",
         "orchestrator.systems.coupling.wire_bank",
         "orchestrator.devices.acceptance.shifted_clock",
-        "orchestrator.devices.fmi.bound",
+        "orchestrator.devices.fmi.bound_component",
         "orchestrator.devices.fmi.fmi3",
-        "orchestrator.devices.fmi.mailbox",
+        "orchestrator.devices.sandbox.mailbox",
     }
     importers = {
         f"orchestrator.{name}" for name in ("cases", "face.agents", "face.api", "face.cli")
@@ -237,17 +238,20 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
             return True
         if a in borrowers:
             return b == "fmus.toolchain.compiler"
-        if a in ("orchestrator.devices.fmi.vendor_files", "orchestrator.devices.fmi.dll_reading"):
+        if a in (
+            "orchestrator.devices.fmi.vendor_files",
+            "orchestrator.devices.sandbox.dll_reading_process",
+        ):
             return (
                 within(b, "fmus.vendor_dll", "fmus.toolchain.cache", "fmus.toolchain.archive")
                 or b == "fmus"
             )
         if (
             within(a, "orchestrator.devices.acceptance.controller_dll")
-            or a == "orchestrator.devices.fmi.dll_worker"
+            or a == "orchestrator.devices.sandbox.dll_process_worker"
         ):
             return within(b, "fmus.vendor_dll")
-        if a == "orchestrator.devices.fmi.wine_program":
+        if a == "orchestrator.devices.sandbox.wine_program":
             return b in ("fmus.toolchain.compiler", "fmus.vendor_dll.memory")
         if a in ("orchestrator.devices.fmi.instance", "orchestrator.systems.ssp.archive"):
             # what was built or unpacked here, and is intact, is trusted
@@ -374,7 +378,7 @@ def test_there_is_no_cycle():
             "fmpy",
             {
                 f"orchestrator.devices.fmi.{name}"
-                for name in ("binary", "description", "loaded", "messages", "validation")
+                for name in ("binary", "description", "loaded_component", "messages", "validation")
             },
         ),
         ("pandapower", {"orchestrator.cases.networks.sources"}),

@@ -12,7 +12,7 @@ import pytest
 from orchestrator.cases.case import load_case
 from orchestrator.cases.form.csv_rows import rows_of
 from orchestrator.cases.networks.psse.dyr_file import read_dyr
-from orchestrator.cases.networks.psse.records import read_records
+from orchestrator.cases.networks.psse.raw_records import read_records
 from orchestrator.cases.networks.source_changes import Changes, Remark
 from orchestrator.core import foreign_files
 from orchestrator.core.errors import CaseError, InputError
@@ -129,9 +129,9 @@ OWN = {
     "devices.acceptance.worker": "/proc",
     "face.api.saved": "results",
     "cases.form.definition": "is_file before it",
-    "cases.networks.psse.record_catalogue": "our own table",
+    "cases.networks.psse.dyr_model_list": "our own table",
     "devices.acceptance.controller_dll.file_head": "is_file before it",
-    "devices.fmi.dll_worker": "the library that this process is started for",
+    "devices.sandbox.dll_process_worker": "the library that this process is started for",
     "cases.networks.psse.missing_models": "our own table",
     "cases.networks.kept_tables": "the cache and our own tables",
     "studies.certification.acceptance": "is_file before it",
@@ -151,7 +151,7 @@ OWN = {
     "face.explore.files": "our own pages",
     "face.explore.opened": "results",
     "devices.fmi.brought_modules": "what an FMU's archive held",
-    "devices.fmi.dll_reading": "is_file before it",
+    "devices.sandbox.dll_reading_process": "is_file before it",
     "devices.fmi.vendor_files": "is_file before it",
     "studies.added": "the code of an installed distribution",
     "studies.points.code": "our own code",
@@ -170,8 +170,8 @@ OWN = {
     "studies.signals.ambient": "a picture that it has drawn",
     "studies.runs.checkpoints": "results",
     "core.toml_files": "check_regular before it",
-    "devices.fmi.limits": "/proc",
-    "devices.fmi.process_tree": "/proc",
+    "devices.sandbox.resource_limits": "/proc",
+    "devices.sandbox.process_tree": "/proc",
 }
 """Modules that read files by themselves, and why no pipe or device can be there."""
 

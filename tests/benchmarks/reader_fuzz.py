@@ -35,7 +35,7 @@ from orchestrator.devices.binding.draft import draft_binding
 from orchestrator.devices.fmi.archive import read_model_description_text
 from orchestrator.devices.fmi.description import parse_description, read_description
 from orchestrator.output.results.comtrade.reading import read_comtrade
-from orchestrator.studies.operating_points.columns import Elements
+from orchestrator.studies.operating_points.point_columns import Elements
 from orchestrator.studies.operating_points.points_file import read_points
 from orchestrator.systems.ssp.names import STUDY_TYPE, SYSTEM_FILE
 from tests.cases.networks.psse import raw

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from tests.control_dll.hosts import Circuit, ControlHost, elements
 
 OMEGA, VOLT = 2 * np.pi * 50, 230e3 * np.sqrt(2 / 3)

@@ -19,7 +19,7 @@ from orchestrator.devices.acceptance.checks.base import Verdict
 from orchestrator.devices.acceptance.controller_dll.conformity import check_dll
 from orchestrator.devices.acceptance.controller_dll.questions import DLL_QUESTIONS
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from orchestrator.face.cli import main
 from tests.control_dll.conftest import PODS
 from tests.control_dll.hosts import STEP, ControlHost, compiled_host, driven, fmu_call

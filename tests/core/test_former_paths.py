@@ -31,7 +31,13 @@ FORMER = {
     "orchestrator.output.results.recorded": "orchestrator.output.results.recording_reader",
     "orchestrator.output.results.recording": "orchestrator.output.results.recording_writer",
     "orchestrator.results.storage": "orchestrator.output.results.file_writers",
-    "orchestrator.cases.psse.known_records": "orchestrator.cases.networks.psse.record_catalogue",
+    "orchestrator.cases.psse.known_records": "orchestrator.cases.networks.psse.dyr_model_list",
+    "orchestrator.cases.networks.psse.records": "orchestrator.cases.networks.psse.raw_records",
+    "orchestrator.fmi.isolation": "orchestrator.devices.fmi.isolated_component",
+    "orchestrator.devices.fmi.limits": "orchestrator.devices.sandbox.resource_limits",
+    "orchestrator.devices.fmi.mailbox": "orchestrator.devices.sandbox.mailbox",
+    "orchestrator.devices.fmi.interrupts": "orchestrator.core.interrupts",
+    "orchestrator.explore.between": "orchestrator.face.explore.interpolation",
 }
 
 

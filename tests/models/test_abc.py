@@ -7,7 +7,7 @@ import pytest
 
 from fmus.toolchain.frames import Phasor, of_phases, phases
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 
 OMEGA_B = 2 * np.pi * 50
 S_N, V_N = 1500.0, 230.0

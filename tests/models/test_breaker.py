@@ -5,7 +5,7 @@ import pytest
 
 from fmus.toolchain.catalogue import build_model
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 
 GENERATORS = [f"synchronous_generator_{exciter}" for exciter in ("ac4a", "st1", "st4b")]
 WATCHED = ("i_re", "i_im", "p", "q", "omega")

@@ -16,7 +16,7 @@ from fmus.toolchain.model_builder import ModelBuilder
 from gfor_fmu.droop import declare_droop, frequency, voltage_reference
 from orchestrator.devices.fmi.component import RealBatch
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from tests.support.evaluated import Evaluated
 
 DROOP = {"droop.R_f": 0.04, "droop.R_V": 0.09, "droop.tau_P": 0.03, "droop.tau_Q": 0.22}

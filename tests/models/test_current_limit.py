@@ -15,7 +15,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.core.errors import ComponentError
 from orchestrator.devices.fmi.component import RealBatch
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from orchestrator.studies.runs.run import run_scenario
 from tests.support.converter_at_grid import AtGrid
 from tests.support.evaluated import Evaluated

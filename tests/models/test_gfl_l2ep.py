@@ -8,7 +8,7 @@ import pytest
 from fmus.toolchain.catalogue import build_model
 from orchestrator.core.errors import ComponentError
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from tests.support.evaluated import Evaluated
 
 OTHERWISE = {

@@ -10,7 +10,7 @@ from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from tests.pages import stability_table
 from tests.support.evaluated import Evaluated
 from tests.support.weak_grid import coupled_modes, least_stable

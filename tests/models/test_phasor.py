@@ -10,7 +10,7 @@ from fmus.grid.phasor_grid import phasor_grid
 from fmus.toolchain.catalogue import build_model
 from orchestrator.core.errors import ComponentError
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from tests.support.jacobians import jacobians
 from tests.support.kernels import taped, vector
 

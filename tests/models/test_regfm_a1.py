@@ -7,7 +7,7 @@ import pytest
 
 from fmus.toolchain.catalogue import build_model
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from tests.support.evaluated import Evaluated
 
 NAME, STEP = "regfm_a1_phasor", 1e-3

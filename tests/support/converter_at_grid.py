@@ -15,7 +15,7 @@ from fmus.toolchain.symbols import Expr
 from gfor_fmu.converter import P_0, S_N, declare_converter, declare_converter_outputs
 from orchestrator.devices.fmi.component import RealBatch
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 
 X_R = 6.0
 """X/R of the grid's impedance: that of MISO's and AEMO's tests of grid-forming converters."""

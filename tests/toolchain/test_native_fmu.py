@@ -16,7 +16,7 @@ from fmus.toolchain.exporter import cached, export
 from fmus.toolchain.native_fmu import NativeFmu
 from orchestrator.core.errors import ComponentError
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from tests.support.host import DISCARD, ERROR, GENERATOR, OK, H, running
 
 MODELS = [name for name in model_names() if not needs_arguments(name)]

@@ -15,7 +15,7 @@ from fmus.toolchain.exporter import export
 from fmus.toolchain.native_fmu import NativeFmu
 from orchestrator.core.errors import ComponentError
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from tests.support.host import OK, Host
 from tests.toolchain.test_native_fmi3 import Host3
 

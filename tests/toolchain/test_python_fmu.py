@@ -19,7 +19,7 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.python_fmu import PythonFmu
 from orchestrator.devices.fmi.component import RealBatch
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 
 NAMES = [name for name in model_names() if not needs_arguments(name)]
 STEP = 1e-4

@@ -20,7 +20,7 @@ from fmus.toolchain.tape_kernel import Kernel
 from orchestrator.core.errors import ComponentError
 from orchestrator.devices.fmi.component import RealBatch
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from tests.support.kernels import KERNELS, compiled, tape_library, taped, vector
 from tests.support.written_out import written_out
 

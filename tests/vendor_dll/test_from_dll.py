@@ -12,7 +12,7 @@ from fmus.vendor_dll.interface import DllParameter, Signal, layout
 from orchestrator.core.errors import ComponentError
 from orchestrator.devices.fmi.component import RealBatch
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from orchestrator.face.cli import main
 from orchestrator.linear.models.component_linearization import linearize_component
 from orchestrator.systems.coupling.turns import Exchange

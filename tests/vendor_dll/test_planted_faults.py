@@ -7,8 +7,8 @@ from orchestrator.core.errors import CosimError, InputError
 from orchestrator.devices.acceptance.runner import check_fmu
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.fmi.instance import open_component
-from orchestrator.devices.fmi.limits import Limits
 from orchestrator.devices.fmi.vendor_files import as_fmu
+from orchestrator.devices.sandbox.resource_limits import Limits
 from tests.support.vendor_dlls import CALLS, INTERFACE, compiled, lag
 
 LATE = "if (s->time > 0.005) "

@@ -8,12 +8,12 @@ import pytest
 
 from fmus.vendor_dll.fmu import DllError, read_dll
 from orchestrator.core.errors import ComponentError, InputError
-from orchestrator.devices.fmi import wine
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.fmi.instance import open_component
-from orchestrator.devices.fmi.isolation import IsolatedComponent
-from orchestrator.devices.fmi.limits import Limits
+from orchestrator.devices.fmi.isolated_component import IsolatedComponent
 from orchestrator.devices.fmi.vendor_files import READER, foreign_platforms
+from orchestrator.devices.sandbox import wine
+from orchestrator.devices.sandbox.resource_limits import Limits
 from orchestrator.face.api.fmu import info
 from orchestrator.linear.models.blocks import Blocks
 from orchestrator.linear.models.periodic import model_of

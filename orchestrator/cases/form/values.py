@@ -53,7 +53,7 @@ def convert(info: VariableInfo, value: Value) -> float | bool:
 
 def check_system_base(description: FmuDescription, variable: str, value: float | bool) -> None:
     """Refuse another system base for a device with our port. In a bound FMU the name has another meaning."""
-    from orchestrator.devices.fmi.port import BoundDescription  # noqa: PLC0415 - FMUs, which reading a file does without
+    from orchestrator.devices.fmi.port_mapping import BoundDescription  # noqa: PLC0415 - FMUs, which reading a file does without
 
     own = not isinstance(description, BoundDescription) and I_RE.name in description.variables
     if own and variable == S_BASE.name and value != SYSTEM_BASE_MVA:

@@ -21,7 +21,7 @@ from orchestrator.cases.questions.plausible_sources import SOLVED, source_doubts
 from orchestrator.cases.questions.plausible_values import outside, place_of, unit_of, value_of
 from orchestrator.core.errors import Problem, QuestionTopic, few
 from orchestrator.core.question_kinds import answer
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 from orchestrator.systems.coupling.schedule import SECOND_ORDER
 from orchestrator.systems.coupling.system import ComponentPlan
 

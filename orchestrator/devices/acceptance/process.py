@@ -18,16 +18,26 @@ from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import ComponentError, InputError
 from orchestrator.devices.acceptance.linear_network import LinearNetwork
 from orchestrator.devices.acceptance.shifted_clock import with_shift
-from orchestrator.devices.fmi import answers
 from orchestrator.devices.fmi.component import RealBatch
-from orchestrator.devices.fmi.confined import ConfinedProcess, ProcessFault
 from orchestrator.devices.fmi.description import FmuDescription, runs_under_wine
-from orchestrator.devices.fmi.limits import TO_BEGIN, Limits, crowded
-from orchestrator.devices.fmi.mailbox import GET, MOST, ROOM, RUN, SET, STEP, TALK, unlocked_library
-from orchestrator.devices.fmi.port import BoundDescription
-from orchestrator.devices.fmi.protection import Protection
-from orchestrator.devices.fmi.refusal import FATAL, refusal
+from orchestrator.devices.fmi.port_mapping import BoundDescription
+from orchestrator.devices.fmi.refused_calls import FATAL, refusal
 from orchestrator.devices.fmi.remote_calls import Form, RemoteCalls
+from orchestrator.devices.sandbox import answer_forms
+from orchestrator.devices.sandbox.foreign_process import ConfinedProcess
+from orchestrator.devices.sandbox.mailbox import (
+    GET,
+    MOST,
+    ROOM,
+    RUN,
+    SET,
+    STEP,
+    TALK,
+    unlocked_library,
+)
+from orchestrator.devices.sandbox.process_end import ProcessFault
+from orchestrator.devices.sandbox.protections_in_force import Protection
+from orchestrator.devices.sandbox.resource_limits import TO_BEGIN, Limits, crowded
 
 _STAGES = {SET: "fmi2SetReal", STEP: "fmi2DoStep", GET: "fmi2GetReal"}
 _GRACE = 1.0  # time [s] in which what an instance started may end after it
@@ -85,7 +95,7 @@ class FmuProcess:
     def _begin(self) -> None:
         try:
             self.protections = self.typed(
-                answers.protections, self.talk("the beginning of its process", -1, "begin")
+                answer_forms.protections, self.talk("the beginning of its process", -1, "begin")
             )
         except ProcessEndedError as error:  # the FMU is not loaded yet
             raise InputError(f"the FMU's process did not start: {error.how}") from error
@@ -103,7 +113,7 @@ class FmuProcess:
         self.box.write_text([instance, command, *arguments])
         self._ask(TALK, call)
         try:
-            return answers.content_of(self.box.read_text(), "fmu")
+            return answer_forms.content_of(self.box.read_text(), "fmu")
         except ValueError as error:
             raise self._tampered(f"{error}") from error
 
@@ -167,12 +177,12 @@ class FmuProcess:
 
     def number(self, call: str, instance: int, command: str, *arguments: Any) -> int:
         """Talk, and take a whole number alone for an answer."""
-        return self.typed(answers.number, self.talk(call, instance, command, *arguments))
+        return self.typed(answer_forms.number, self.talk(call, instance, command, *arguments))
 
     def typed(self, form: Callable[..., Form], answer: Any, *wanted: Any) -> Form:
         try:
             return form(answer, *wanted)
-        except answers.NotAnAnswerError as error:
+        except answer_forms.NotAnAnswerError as error:
             raise self._tampered(f"{error}") from error
 
     def _ask(self, kind: int, call: str) -> int:

@@ -36,12 +36,12 @@ from orchestrator.devices.acceptance.process import FmuProcess, ProcessEndedErro
 from orchestrator.devices.binding.binding import bind, read_table
 from orchestrator.devices.binding.misfits import is_consequence, likely_cause
 from orchestrator.devices.fmi.archive import extract, listed_twice
-from orchestrator.devices.fmi.confined import ProcessFault
 from orchestrator.devices.fmi.description import FmuDescription, read_description
 from orchestrator.devices.fmi.instance import compile_adapters
-from orchestrator.devices.fmi.limits import Limits, crowded
-from orchestrator.devices.fmi.port import BoundDescription
-from orchestrator.devices.fmi.protection import Protection, missing
+from orchestrator.devices.fmi.port_mapping import BoundDescription
+from orchestrator.devices.sandbox.process_end import ProcessFault
+from orchestrator.devices.sandbox.protections_in_force import Protection, missing
+from orchestrator.devices.sandbox.resource_limits import Limits, crowded
 
 CRASH = "crash"  # fault of a process that dies
 _LAST = 3  # checks before a crash that are named

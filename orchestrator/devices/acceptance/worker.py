@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.devices.fmi.binary import absent_functions, load, unload
-from orchestrator.devices.fmi.bound import BoundComponent
+from orchestrator.devices.fmi.bound_component import BoundComponent
 from orchestrator.devices.fmi.component import Component
 from orchestrator.devices.fmi.description import FmuDescription, runs_under_wine
 from orchestrator.devices.fmi.instance import open_component
-from orchestrator.devices.fmi.isolation_worker import Worker
-from orchestrator.devices.fmi.loaded import LoadedComponent
-from orchestrator.devices.fmi.mailbox import DIED, Served
-from orchestrator.devices.fmi.port import BoundDescription, PortMap, without_binding
+from orchestrator.devices.fmi.isolated_component_worker import Worker
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
+from orchestrator.devices.fmi.port_mapping import BoundDescription, PortMap, without_binding
+from orchestrator.devices.sandbox.mailbox import DIED, Served
 
 _MALLINFO2 = [
     "arena",

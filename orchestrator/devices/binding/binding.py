@@ -24,7 +24,7 @@ from orchestrator.devices.binding.scales import (
 )
 from orchestrator.devices.binding.tables import BindingTable, PhasorTable, SignalTable, StartTable
 from orchestrator.devices.fmi.description import FmuDescription, VariableInfo, read_description
-from orchestrator.devices.fmi.port import (
+from orchestrator.devices.fmi.port_mapping import (
     START,
     BoundDescription,
     Form,

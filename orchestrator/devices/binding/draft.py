@@ -8,7 +8,7 @@ from pathlib import Path
 from orchestrator.devices.binding import hints
 from orchestrator.devices.binding.tables import REQUIRED
 from orchestrator.devices.fmi.description import FmuDescription, VariableInfo
-from orchestrator.devices.fmi.port import START
+from orchestrator.devices.fmi.port_mapping import START
 
 _VOLTAGE = re.compile(
     r"^(v|u|volt|voltage|vbus|vt|vpcc|vg|ug|upcc)(?![a-z])|volt|spannung", re.IGNORECASE

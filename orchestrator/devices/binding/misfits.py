@@ -12,7 +12,7 @@ import numpy as np
 
 from orchestrator.core.arrays import Numbers
 from orchestrator.devices.fmi.description import FmuDescription
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 
 # deviation of the power from what was asked up to which signs and bases are right; losses are below
 BALANCE = 0.02

@@ -14,7 +14,7 @@ from orchestrator.core.errors import FmuFileError, UnsupportedFmuError
 from orchestrator.devices.fmi.description import FmuDescription, runs_under_wine
 from orchestrator.devices.fmi.fmi3 import FUNCTIONS as FUNCTIONS_OF_3
 from orchestrator.devices.fmi.fmi3 import in_words_of_3, needed_functions
-from orchestrator.devices.fmi.wine import PLATFORM
+from orchestrator.devices.sandbox.wine import PLATFORM
 
 # those of co-simulation
 _FUNCTIONS = tuple(name for name in dir(FMU2Slave) if name.startswith("fmi2"))

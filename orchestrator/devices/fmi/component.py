@@ -1,7 +1,7 @@
 """Calls that every running FMU offers, wherever it runs, and its Real variables in batches.
 
-An instance is loaded into this process (`loaded`), runs in one of its own (`isolation`) or stands behind a binding
-(`bound`); the acceptance tests have a fourth kind. They share this form and no data."""
+An instance is loaded into this process (`loaded_component`), runs in one of its own (`isolated_component`) or stands
+behind a binding (`bound_component`); the acceptance tests have a fourth kind. They share this form and no data."""
 
 import ctypes
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from orchestrator.core.closing import Closing
 from orchestrator.core.errors import InputError
+from orchestrator.core.interrupts import calls
 from orchestrator.devices.fmi.description import FmuDescription
-from orchestrator.devices.fmi.interrupts import calls
 
 
 class Component(Protocol):

@@ -19,7 +19,6 @@ from fmus.toolchain.variables import Usual
 from orchestrator.core.errors import FmuFileError, UnsupportedFmuError
 from orchestrator.core.foreign_files import one_line
 from orchestrator.core.uncollected import uncollected
-from orchestrator.devices.fmi import wine
 from orchestrator.devices.fmi.archive import (
     BACKSLASHES,
     MODEL_DESCRIPTION,
@@ -31,6 +30,7 @@ from orchestrator.devices.fmi.archive import (
 from orchestrator.devices.fmi.clocks import FmiClock, clocks_of, special_variables
 from orchestrator.devices.fmi.values import Scalar, typed
 from orchestrator.devices.fmi.vendor_files import as_fmu
+from orchestrator.devices.sandbox import wine
 
 TOOL = "gfor-cosim"
 REVERSE_DOMAIN = "org.gfor-cosim"  # begins the names of what is ours inside other people's formats

@@ -4,16 +4,20 @@ import filecmp
 from pathlib import Path
 
 from fmus.toolchain.cache import cache_directory, intact
-from orchestrator.devices.fmi.bound import BoundComponent, compiled_adapter
+from orchestrator.devices.fmi.bound_component import BoundComponent, compiled_adapter
 from orchestrator.devices.fmi.component import Component
-from orchestrator.devices.fmi.converted import ConvertedComponent, ConvertedDescription, native
+from orchestrator.devices.fmi.converted_component import (
+    ConvertedComponent,
+    ConvertedDescription,
+    native,
+)
 from orchestrator.devices.fmi.description import FmuDescription, runs_under_wine
 from orchestrator.devices.fmi.fmi3 import adapter_path
-from orchestrator.devices.fmi.isolation import IsolatedComponent
-from orchestrator.devices.fmi.loaded import LoadedComponent
-from orchestrator.devices.fmi.port import BoundDescription
-from orchestrator.devices.fmi.protection import Protection
-from orchestrator.devices.fmi.wine_program import compile_programs
+from orchestrator.devices.fmi.isolated_component import IsolatedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
+from orchestrator.devices.fmi.port_mapping import BoundDescription
+from orchestrator.devices.sandbox.protections_in_force import Protection
+from orchestrator.devices.sandbox.wine_program import compile_programs
 
 
 def is_ours(path: Path) -> bool:

@@ -9,7 +9,8 @@ from weakref import WeakValueDictionary
 
 from fmpy import calloc, fmi2, free
 
-FLOODED = 97  # exit code of a process whose FMU logs without end
+from orchestrator.devices.sandbox.resource_limits import FLOODED
+
 _KEPT = 50
 
 try:  # printf-style arguments of native FMUs need fmpy's proxy; it is missing on some platforms

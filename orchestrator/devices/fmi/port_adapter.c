@@ -1,5 +1,5 @@
 /* FMI 2.0 functions that speak the port of this project to the outside, and a foreign FMU's own variables to the inside.
-   `bound.py` describes the same structures to Python. A component without a binding never comes here. */
+   `bound_component.py` describes the same structures to Python. A component without a binding never comes here. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

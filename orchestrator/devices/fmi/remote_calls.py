@@ -4,12 +4,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeVar
 
-from orchestrator.devices.fmi import answers
 from orchestrator.devices.fmi.component import Derived, RealBatch
 from orchestrator.devices.fmi.description import FmuDescription
-from orchestrator.devices.fmi.mailbox import Mailbox
 from orchestrator.devices.fmi.messages import texts
-from orchestrator.devices.fmi.refusal import check_log
+from orchestrator.devices.fmi.refused_calls import check_log
+from orchestrator.devices.sandbox import answer_forms
+from orchestrator.devices.sandbox.mailbox import Mailbox
 
 Form = TypeVar("Form")
 
@@ -44,7 +44,7 @@ class RemoteCalls(Derived, ABC):
 
     def progress_of_step(self) -> tuple[bool, float | None]:
         return self._typed(
-            answers.progress, self._remote("fmi2GetBooleanStatus", "progress_of_step")
+            answer_forms.progress, self._remote("fmi2GetBooleanStatus", "progress_of_step")
         )
 
     def reset(self) -> None:
@@ -61,10 +61,10 @@ class RemoteCalls(Derived, ABC):
 
     def values(self, names: Iterable[str]) -> dict[str, float | bool]:
         wanted = list(names)
-        return self._typed(answers.table_of, self._remote("reading", "values", wanted), wanted)
+        return self._typed(answer_forms.table_of, self._remote("reading", "values", wanted), wanted)
 
     def save_state(self) -> Any:
-        return self._typed(answers.number, self._remote("fmi2GetFMUstate", "save_state"))
+        return self._typed(answer_forms.number, self._remote("fmi2GetFMUstate", "save_state"))
 
     def restore_state(self, state: Any) -> None:
         self._remote("fmi2SetFMUstate", "restore_state", state)
@@ -74,11 +74,12 @@ class RemoteCalls(Derived, ABC):
 
     def serialize_state(self, state: Any) -> bytes:
         return self._typed(
-            answers.hexadecimal, self._remote("fmi2SerializeFMUstate", "serialize_state", state)
+            answer_forms.hexadecimal,
+            self._remote("fmi2SerializeFMUstate", "serialize_state", state),
         )
 
     def deserialize_state(self, content: bytes) -> Any:
         return self._typed(
-            answers.number,
+            answer_forms.number,
             self._remote("fmi2DeSerializeFMUstate", "deserialize_state", content.hex()),
         )

@@ -12,7 +12,7 @@ from fmus.toolchain.extras import require
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import check_regular
 from orchestrator.core.safe_files import file_hash
-from orchestrator.devices.fmi import wine
+from orchestrator.devices.sandbox import wine
 
 DLL_ENDINGS = (".so", ".dll", ".dylib")
 DEVICE_ENDING = ".toml"  # of a file that lays a circuit around a DLL
@@ -25,7 +25,7 @@ _log = logging.getLogger("gfor")
 # FMUs for now that this process made, by where they would be kept for good
 _tried_now: dict[Path, Path] = {}
 # module whose process, closed off, reads a DLL, also for Windows, under Wine
-READER = "orchestrator.devices.fmi.dll_reading"
+READER = "orchestrator.devices.sandbox.dll_reading_process"
 
 
 def foreign_platforms(library: Path) -> tuple[str, ...]:
@@ -33,7 +33,7 @@ def foreign_platforms(library: Path) -> tuple[str, ...]:
         with library.open("rb") as file:
             windows = file.read(2) == b"MZ" and sys.platform == "linux"
         if windows:
-            from orchestrator.devices.fmi.wine_program import compile_programs  # noqa: PLC0415 - numpy, for others in vain
+            from orchestrator.devices.sandbox.wine_program import compile_programs  # noqa: PLC0415 - numpy, for others in vain
 
             wine.find_wine()
             compile_programs()  # once, for minutes: before the DLL's time is taken

@@ -16,8 +16,8 @@ from orchestrator.devices.acceptance.controller_dll.questions import DLL_QUESTIO
 from orchestrator.devices.acceptance.junit import write_junit
 from orchestrator.devices.acceptance.runner import AcceptanceReport, check_fmu, question_of
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.limits import LEAST_MEMORY, Limits
 from orchestrator.devices.fmi.vendor_files import as_fmu, controller_dll
+from orchestrator.devices.sandbox.resource_limits import LEAST_MEMORY, Limits
 from orchestrator.face.api.case import Case
 
 DataFrame = Any

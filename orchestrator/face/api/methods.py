@@ -11,7 +11,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar, cast
 
 from orchestrator.core.asked import Asked, asked_of, checked, require_known
 from orchestrator.core.errors import InputError
-from orchestrator.devices.fmi.turn import turn
+from orchestrator.devices.fmi.interpreter_turn import turn
 
 Asks = ParamSpec("Asks")
 Shown = TypeVar("Shown")

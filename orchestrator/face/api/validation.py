@@ -13,7 +13,7 @@ from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.devices.fmi.description import FmuDescription
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 from orchestrator.face.api.given_recording import Recorded, open_given
 from orchestrator.face.api.methods import in_turn
 from orchestrator.studies.black_box.port import start_of, values_for

@@ -13,10 +13,10 @@ from typing import Any
 
 from fmus.toolchain.extras import SetupError
 from orchestrator.core.errors import INTERRUPTED, TERMINATED, CosimError, InputError
+from orchestrator.core.interrupts import calls
 from orchestrator.core.late import import_xarray_alone
 from orchestrator.core.safe_files import inputs, spare_input
 from orchestrator.core.spelling import as_options
-from orchestrator.devices.fmi.interrupts import calls
 from orchestrator.face.cli.interrupted import ending, is_interrupt
 from orchestrator.face.cli.later import answer_first
 from orchestrator.output.results import origin

@@ -6,7 +6,7 @@ from pathlib import Path
 from orchestrator.core.errors import InputError
 from orchestrator.devices.binding.tables import REQUIRED
 from orchestrator.devices.fmi.description import read_declared
-from orchestrator.devices.fmi.devices import NO_BUS, is_controller_alone
+from orchestrator.devices.fmi.device_or_controller import NO_BUS, is_controller_alone
 from orchestrator.face.api.binding import bind
 from orchestrator.face.cli.arguments import add_options
 

@@ -14,7 +14,7 @@ from rich.text import Text
 from orchestrator.cases.form.devices import Device
 from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import made_folder
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 from orchestrator.face.cli.arguments import asked_by, choose_executor
 from orchestrator.face.cli.certify_sensitivities import find_needs
 from orchestrator.face.cli.interrupted import saying_how_it_goes_on

@@ -9,7 +9,7 @@ from rich.markup import escape
 from orchestrator.core.foreign_files import one_line
 from orchestrator.devices.acceptance.checks.base import CheckResult, Verdict
 from orchestrator.devices.acceptance.runner import AcceptanceReport
-from orchestrator.devices.fmi.protection import missing
+from orchestrator.devices.sandbox.protections_in_force import missing
 from orchestrator.face.api.acceptance import check
 from orchestrator.face.cli.arguments import add_kept_argument, add_options
 from orchestrator.face.cli.terminal import keep_json, print_json

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from orchestrator.devices.fmi.interrupts import calls
+from orchestrator.core.interrupts import calls
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from orchestrator.cases.networks.psse.record_catalogue import known_records
+from orchestrator.cases.networks.psse.dyr_model_list import known_records
 from orchestrator.cases.networks.record_use import as_json, in_full
 from orchestrator.cases.new.network_files import sources_of
 from orchestrator.cases.new.new_case import write_case

@@ -22,9 +22,9 @@ from orchestrator.core.errors import (
     ResultsError,
     RunInterruptedError,
 )
+from orchestrator.core.interrupts import calls
 from orchestrator.core.late import xr
 from orchestrator.core.safe_files import PARTIAL, made_folder
-from orchestrator.devices.fmi.interrupts import calls
 from orchestrator.face.api.scenario import RunEndedWarning, Scenario
 from orchestrator.face.cli import checkpoints, federates, run_request, terminal
 from orchestrator.face.cli.arguments import add_options, add_request_arguments, tolerance

@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from orchestrator.cases.scenario.prepare import PreparedScenario
-from orchestrator.devices.fmi.loaded import PYTHON_BACKED
+from orchestrator.devices.fmi.loaded_component import PYTHON_BACKED
 from orchestrator.face.cli.terminal import print_named_modes, print_sources
 from orchestrator.face.cli.verdict import print_answers, print_details
 from orchestrator.studies.runs import tables

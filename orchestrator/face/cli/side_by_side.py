@@ -19,8 +19,8 @@ from typing import Any, cast
 from fmus.toolchain import temporary
 from orchestrator.core.cores import number_of_cores
 from orchestrator.core.errors import CosimError, ErrorKind, RunInterruptedError
-from orchestrator.devices.fmi.interrupts import calls
-from orchestrator.devices.fmi.linux import die_with_parent
+from orchestrator.core.interrupts import calls
+from orchestrator.devices.sandbox.kernel_calls import die_with_parent
 from orchestrator.face.cli.interrupted import is_interrupt
 from orchestrator.studies.runs.run import RunResult
 

@@ -14,8 +14,8 @@ from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import CosimError, InputError
 from orchestrator.core.safe_files import check_page, write_text
 from orchestrator.face.api.case import Case
-from orchestrator.face.explore.between import cells_of, corners_of, judged_cell
 from orchestrator.face.explore.files import whole_page
+from orchestrator.face.explore.interpolation import cells_of, corners_of, judged_cell
 from orchestrator.face.explore.movers import grid_of
 from orchestrator.face.explore.smaller import rounded, smaller_answer, smaller_parameters
 from orchestrator.face.explore.worker import Desk

@@ -22,8 +22,8 @@ from orchestrator.cases.scenario.service import in_service
 from orchestrator.cases.settings.layers import OptionValues
 from orchestrator.core.arrays import Complex
 from orchestrator.core.errors import CosimError, InputError, few
+from orchestrator.core.interrupts import calls
 from orchestrator.core.spelling import as_options
-from orchestrator.devices.fmi.interrupts import calls
 from orchestrator.face.api.case import Case, load
 from orchestrator.face.api.results import Modes
 from orchestrator.face.api.scenario import Scenario

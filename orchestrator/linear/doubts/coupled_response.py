@@ -15,7 +15,7 @@ from orchestrator.core.arrays import Matrix
 from orchestrator.core.errors import ComponentError
 from orchestrator.core.options import Option
 from orchestrator.devices.fmi.instance import is_ours
-from orchestrator.devices.fmi.port import without_binding
+from orchestrator.devices.fmi.port_mapping import without_binding
 from orchestrator.linear.models.coupled_state import CoupledState
 from orchestrator.linear.models.delays import links_of, values_on_the_way
 from orchestrator.linear.models.linear_model import HELD, IDENTIFIED, LinearModel

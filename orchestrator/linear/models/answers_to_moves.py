@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from fmus.toolchain.compiler import compile_here
 from orchestrator.core.arrays import Matrix
+from orchestrator.core.interrupts import calls
 from orchestrator.devices.fmi.component import Component, RealBatch, address_of
-from orchestrator.devices.fmi.interrupts import calls
 
 _SOURCE = Path(__file__).with_name("answers_to_moves.c")
 _CALLS = {1: "fmi2SetReal", 2: "fmi2GetReal", 3: "fmi2DoStep", 4: "fmi2SetFMUstate"}

@@ -22,7 +22,7 @@ from orchestrator.devices.binding.misfits import (
 )
 from orchestrator.devices.fmi.component import Component
 from orchestrator.devices.fmi.instance import open_component
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 from orchestrator.systems.coupling.master import Master
 
 _HOLDS = 0.2  # time [s] for which a device is held alone before its omega is read

@@ -7,9 +7,9 @@ from orchestrator.core.arrays import Matrix
 from orchestrator.core.errors import AnalysisError, ErrorKind
 from orchestrator.core.options import Option, command
 from orchestrator.devices.fmi.component import Component, RealBatch
-from orchestrator.devices.fmi.converted import ConvertedDescription
+from orchestrator.devices.fmi.converted_component import ConvertedDescription
 from orchestrator.devices.fmi.linear_model import EmbeddedModel, read_embedded_model
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 
 # largest difference of a variable from the model's operating point, relative to max(1, |value|)
 _TOLERANCE = 1e-6

@@ -107,7 +107,7 @@ def _columns(file: Any) -> dict[str, dict[str, Any]]:
 def _read_when_used(
     pieces: Sequence[Piece], attributes: Mapping[str, Any], units: Mapping[str, Mapping[str, Any]]
 ) -> xr.Dataset:
-    from orchestrator.output.results.columns import dataset_of  # noqa: PLC0415 - imports xarray
+    from orchestrator.output.results.xarray_columns import dataset_of  # noqa: PLC0415 - imports xarray
 
     return dataset_of(pieces, attributes, units)
 

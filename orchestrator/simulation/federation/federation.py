@@ -21,13 +21,13 @@ from fmus.toolchain.extras import require
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.closing import Closing
 from orchestrator.core.errors import ComponentError, InputError
+from orchestrator.core.interrupts import calls
 from orchestrator.core.options import Option
 from orchestrator.devices.fmi.component import Component
-from orchestrator.devices.fmi.confined import fault_of_exit, last_line
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.instance import compile_adapters, open_component
-from orchestrator.devices.fmi.interrupts import calls
-from orchestrator.devices.fmi.limits import Limits
+from orchestrator.devices.sandbox.process_end import fault_of_exit, last_line
+from orchestrator.devices.sandbox.resource_limits import Limits
 from orchestrator.simulation.federation import frames
 from orchestrator.simulation.federation.choice import PROTOCOL, Federates
 from orchestrator.simulation.federation.component import FederatedComponent, obstacle_of

@@ -10,7 +10,7 @@ from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.core.arrays import Numbers
 from orchestrator.devices.binding.misfits import of_dip
 from orchestrator.devices.fmi.component import Component, RealBatch
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 from orchestrator.simulation.watch.finding import MISFIT, Finding
 from orchestrator.simulation.watch.limit import BYPASS_TIME, MACHINE_LIMITS, Lead, Limit
 from orchestrator.simulation.watch.seen import Seen

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import few
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 from orchestrator.simulation.watch.finding import Finding
 from orchestrator.simulation.watch.seen import Seen
 from orchestrator.simulation.watch.settings import Settings

@@ -16,10 +16,10 @@ import numpy as np
 from fmus.toolchain.compiler import compile_here
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import AnalysisError, InputError
+from orchestrator.core.interrupts import calls
 from orchestrator.devices.fmi.component import Component, RealBatch
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.instance import open_component
-from orchestrator.devices.fmi.interrupts import calls
 from orchestrator.devices.fmi.many_steps import StepRows
 from orchestrator.linear.models.sampled import steps_of_times, times_of
 

@@ -10,7 +10,7 @@ from orchestrator.cases.form.values import check_system_base, convert
 from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
 from orchestrator.devices.fmi.description import FmuDescription
-from orchestrator.devices.fmi.devices import NO_BUS, is_controller_alone
+from orchestrator.devices.fmi.device_or_controller import NO_BUS, is_controller_alone
 from orchestrator.studies.black_box.bench import Bench
 
 

@@ -7,7 +7,7 @@ from orchestrator.cases.form.schema import Value
 from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
 from orchestrator.devices.fmi.description import FmuDescription, VariableInfo
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 from orchestrator.devices.fmi.values import as_text
 from orchestrator.studies.certification.request import CertificationRequest
 

@@ -11,7 +11,7 @@ import xarray as xr
 
 from orchestrator.devices.fmi.archive import read_origin
 from orchestrator.devices.fmi.description import FmuDescription, VariableInfo
-from orchestrator.devices.fmi.port import START, BoundDescription, without_binding
+from orchestrator.devices.fmi.port_mapping import START, BoundDescription, without_binding
 from orchestrator.devices.fmi.values import Scalar
 from orchestrator.linear.spectra.modes import damping_ratio
 from orchestrator.output.results.mode_json import eigenvalue_json

@@ -24,7 +24,7 @@ from orchestrator.core.errors import CosimError, FmuFileError, InputError, few
 from orchestrator.core.options import Option, command
 from orchestrator.core.safe_files import write_bytes
 from orchestrator.devices.fmi.archive import DAMAGE, extract, names_in
-from orchestrator.devices.fmi.bound import BoundComponent
+from orchestrator.devices.fmi.bound_component import BoundComponent
 from orchestrator.devices.fmi.component import Component
 from orchestrator.output.signatures.signing import Made
 from orchestrator.studies.certification.case_file import CASE, FMU, WITH

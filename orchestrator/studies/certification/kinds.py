@@ -14,7 +14,7 @@ from orchestrator.core.asked import FILE, FLAG, FieldKind, number_in, one_of, pa
 from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
 from orchestrator.core.spelling import Spelling
-from orchestrator.devices.fmi.devices import as_device
+from orchestrator.devices.fmi.device_or_controller import as_device
 from orchestrator.studies.certification import points_again
 from orchestrator.studies.certification.acceptance import KEPT, Acceptance
 from orchestrator.studies.certification.certificate import Certificate

@@ -7,7 +7,7 @@ from html import escape
 
 from orchestrator.devices.binding.binding import read_table
 from orchestrator.devices.fmi.archive import read_origin
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 from orchestrator.devices.fmi.values import Scalar, as_text
 from orchestrator.output.report.html.elements import SHADES, Figures, bullet_list, document, table
 from orchestrator.output.report.short_texts import short

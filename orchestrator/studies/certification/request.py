@@ -10,7 +10,7 @@ from orchestrator.core.asked import as_number
 from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
 from orchestrator.devices.binding.binding import bound_fmu
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 from orchestrator.devices.fmi.values import as_text
 
 # values of X_L in the norm [pu, 100 MVA]

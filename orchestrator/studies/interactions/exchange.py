@@ -17,7 +17,7 @@ from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.devices.fmi.description import FmuDescription
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 from orchestrator.studies.interactions.places import Place
 
 # largest difference of a bus voltage [pu] between two systems at the same operating point

@@ -20,7 +20,7 @@ from orchestrator.core.asked import (
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
-from orchestrator.devices.fmi.devices import as_device
+from orchestrator.devices.fmi.device_or_controller import as_device
 from orchestrator.studies.points.request import OverPoints, of_scenario, of_values
 
 RANGE_HZ = (0.1, 100.0)

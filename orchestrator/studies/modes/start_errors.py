@@ -5,7 +5,7 @@ from orchestrator.cases.scenario.feeding_loads import feeding_loads
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import ComponentError, ErrorKind, Problem, StartError
 from orchestrator.devices.fmi.instance import is_ours
-from orchestrator.devices.fmi.refusal import refuses_to_start
+from orchestrator.devices.fmi.refused_calls import refuses_to_start
 
 _PREFACE = "parameters cannot be used: "
 """Begins what our models log of values that do not fit together, and is said by "cannot start" already. By FMI a model

@@ -6,7 +6,7 @@ from typing import Literal
 
 from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
-from orchestrator.studies.operating_points.columns import Elements
+from orchestrator.studies.operating_points.point_columns import Elements
 
 _AT = " at "
 

@@ -9,8 +9,8 @@ from orchestrator.cases.form.names import close_names
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError, few
 from orchestrator.core.options import Option
-from orchestrator.studies.operating_points.columns import Elements
 from orchestrator.studies.operating_points.line_ends import LineEnd, line_of, read_end
+from orchestrator.studies.operating_points.point_columns import Elements
 
 INTACT = "intact"  # name of the network without an outage
 _KINDS = ("n-1", "lines", "units")

@@ -12,10 +12,10 @@ from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.settings.layers import OptionValues
 from orchestrator.core.asked import Names
 from orchestrator.core.errors import InputError
-from orchestrator.studies.operating_points.columns import Elements
 from orchestrator.studies.operating_points.item import Item
 from orchestrator.studies.operating_points.line_ends import lines_with_ends
 from orchestrator.studies.operating_points.outages import Outage, read_outages
+from orchestrator.studies.operating_points.point_columns import Elements
 from orchestrator.studies.operating_points.points_file import (
     OperatingCase,
     questions_about,

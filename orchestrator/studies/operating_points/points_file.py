@@ -13,7 +13,7 @@ from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError, Problem, few
 from orchestrator.core.given_files import ShownFile
 from orchestrator.core.units import read_value
-from orchestrator.studies.operating_points.columns import (
+from orchestrator.studies.operating_points.point_columns import (
     ACTIVE,
     IN_SERVICE,
     Elements,

@@ -17,10 +17,10 @@ from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.scenario.service import without_units
 from orchestrator.core.errors import CosimError, ErrorKind, InputError, StartError, few
 from orchestrator.core.options import Option
-from orchestrator.studies.operating_points.columns import Elements, least_scale
 from orchestrator.studies.operating_points.item import Item, Status
 from orchestrator.studies.operating_points.line_ends import LineEnd, line_of
 from orchestrator.studies.operating_points.outages import Remains, what_remains
+from orchestrator.studies.operating_points.point_columns import Elements, least_scale
 from orchestrator.studies.points.failure import Failure
 from orchestrator.systems.coupling.system import System
 

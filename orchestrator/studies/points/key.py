@@ -14,9 +14,9 @@ from orchestrator.cases.form.definition import CaseDefinition
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import check_regular
-from orchestrator.devices.fmi.converted import ConvertedDescription, native
+from orchestrator.devices.fmi.converted_component import ConvertedDescription, native
 from orchestrator.devices.fmi.description import FmuDescription
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 from orchestrator.studies.points.code import code_hash, numbers_hash
 from orchestrator.systems.coupling.imperfections import described
 

@@ -19,7 +19,7 @@ from types import FrameType
 from typing import Any
 
 from fmus.toolchain.temporary import leave, own_folder, remove
-from orchestrator.devices.fmi.interrupts import calls
+from orchestrator.core.interrupts import calls
 from orchestrator.studies.points.lost_workers import (
     ENDED,
     Result,

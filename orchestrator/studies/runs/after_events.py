@@ -8,7 +8,7 @@ from orchestrator.linear.spectra.mode_tracking import ModeSet, match
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.simulation.watch.settings import left_changed
 from orchestrator.studies.modes.modes import ModesResult, compute_modes
-from orchestrator.studies.operating_points.columns import Elements
+from orchestrator.studies.operating_points.point_columns import Elements
 
 
 def lasting_changes(prepared: PreparedScenario) -> Mapping[str, float | bool]:

@@ -17,11 +17,11 @@ from orchestrator.core.errors import (
     ResultsError,
     RunInterruptedError,
 )
+from orchestrator.core.interrupts import calls
 from orchestrator.core.options import Option
 from orchestrator.devices.fmi.component import Component
 from orchestrator.devices.fmi.instance import is_isolated, protections_of
-from orchestrator.devices.fmi.interrupts import calls
-from orchestrator.devices.fmi.protection import Protection, missing
+from orchestrator.devices.sandbox.protections_in_force import Protection, missing
 from orchestrator.linear.doubts.coupling_growth import coupling_growth
 from orchestrator.linear.doubts.excitation_limiters import limiter_warnings
 from orchestrator.linear.doubts.external_exciters import start_warnings

@@ -13,10 +13,10 @@ from orchestrator.simulation.watch.own_trips import OWN_TRIPS
 from orchestrator.simulation.watch.relay_trips import finding_of, relays_in
 from orchestrator.simulation.watch.watch import Watch
 from orchestrator.studies.modes.modes import running
-from orchestrator.studies.operating_points.columns import least_scale
 from orchestrator.studies.operating_points.item import Item
 from orchestrator.studies.operating_points.line_ends import LineEnd
 from orchestrator.studies.operating_points.outages import what_remains
+from orchestrator.studies.operating_points.point_columns import least_scale
 from orchestrator.studies.operating_points.preparation import ItemPreparation
 from orchestrator.studies.screening.record import OutageRun, RelayTrip, WentWrong
 from orchestrator.systems.coupling.bus_relays import Trip

@@ -11,10 +11,10 @@ from orchestrator.linear.spectra.critical_modes import DENSE
 from orchestrator.linear.spectra.shifted_equations import GROWING
 from orchestrator.linear.spectra.stability import zeros_in_words
 from orchestrator.output.report.verdict_sentence import VerdictSentence
-from orchestrator.studies.operating_points.columns import Elements
 from orchestrator.studies.operating_points.item import Status
 from orchestrator.studies.operating_points.line_ends import LineEnd
 from orchestrator.studies.operating_points.outages import Outage
+from orchestrator.studies.operating_points.point_columns import Elements
 from orchestrator.studies.operating_points.points_file import OperatingCase
 from orchestrator.studies.operating_points.words import ONE_ITEM, all_items, counted_items
 from orchestrator.studies.screening.modes import UNSTABLE

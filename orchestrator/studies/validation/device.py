@@ -14,7 +14,7 @@ from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
 from orchestrator.devices.fmi.component import Component, RealBatch
 from orchestrator.devices.fmi.description import FmuDescription
-from orchestrator.devices.fmi.devices import NO_BUS, PORT, is_controller_alone
+from orchestrator.devices.fmi.device_or_controller import NO_BUS, PORT, is_controller_alone
 from orchestrator.devices.fmi.instance import is_ours
 from orchestrator.studies.black_box.bench import drive
 from orchestrator.studies.validation.averaging import averaged

@@ -10,7 +10,7 @@ from enum import StrEnum
 import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 from orchestrator.studies.validation.device import OperatingStart, Played, PlayedDevice
 from orchestrator.studies.validation.figures import (
     SIGNALS,

@@ -13,7 +13,7 @@ from orchestrator.core.late import xr
 from orchestrator.core.options import Option
 from orchestrator.core.threads import one_thread
 from orchestrator.studies.validation.beside import WindowApart, models_apart
-from orchestrator.studies.validation.between import with_doubt_between
+from orchestrator.studies.validation.between_samples import with_doubt_between
 from orchestrator.studies.validation.causes import CauseSearch, Explanation
 from orchestrator.studies.validation.device import PlayedDevice, StartRefusedError
 from orchestrator.studies.validation.event import (

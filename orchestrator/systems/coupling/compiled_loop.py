@@ -19,7 +19,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from fmus.toolchain.compiler import compile_here
 from orchestrator.core.cores import MOST_THREADS, number_of_cores
-from orchestrator.devices.fmi.interrupts import calls
+from orchestrator.core.interrupts import calls
 from orchestrator.systems.coupling.sharing import Trial, best_number, shares, worth_sharing
 from orchestrator.systems.coupling.tracks import Tracks
 from orchestrator.systems.coupling.turns import Turn, not_finite

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from orchestrator.devices.fmi.interrupts import calls
+from orchestrator.core.interrupts import calls
 from orchestrator.systems.coupling.events import Event, Forcing
 from orchestrator.systems.coupling.observers import Observer
 from orchestrator.systems.coupling.run import Run

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.core.errors import ComponentError, InputError, NotFiniteError, NotTakenUpError
-from orchestrator.devices.fmi.bound import BoundComponent
+from orchestrator.core.interrupts import calls
+from orchestrator.devices.fmi.bound_component import BoundComponent
 from orchestrator.devices.fmi.component import Component
-from orchestrator.devices.fmi.converted import ConvertedComponent
-from orchestrator.devices.fmi.interrupts import calls
-from orchestrator.devices.fmi.isolation import IsolatedComponent
+from orchestrator.devices.fmi.converted_component import ConvertedComponent
+from orchestrator.devices.fmi.isolated_component import IsolatedComponent
 from orchestrator.systems.coupling.bus_relays import Relays
 from orchestrator.systems.coupling.events import Event, NotANumber, Silence, WireFault, WireRecovery
 from orchestrator.systems.coupling.kept_form import check_form, of_this_run

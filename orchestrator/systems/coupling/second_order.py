@@ -15,7 +15,7 @@ import scipy.sparse.linalg as spla
 from numpy.typing import NDArray
 
 from orchestrator.core.errors import CouplingError, InputError
-from orchestrator.devices.fmi.interrupts import calls
+from orchestrator.core.interrupts import calls
 from orchestrator.systems.coupling import compiled_loop
 from orchestrator.systems.coupling.compiled_loop import CompiledLoop
 from orchestrator.systems.coupling.schedule import Schedule

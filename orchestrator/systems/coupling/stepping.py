@@ -11,8 +11,8 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.core.interrupts import calls
 from orchestrator.devices.fmi.component import Component, RealBatch
-from orchestrator.devices.fmi.interrupts import calls
 from orchestrator.systems.coupling import compiled_loop
 from orchestrator.systems.coupling.adaptive import AdaptiveLoop
 from orchestrator.systems.coupling.compiled_loop import CompiledLoop

@@ -134,13 +134,13 @@ class System:
 
     def _declared_type(self, end: Endpoint) -> str:
         """The type that the FMU itself declares for a variable."""
-        from orchestrator.devices.fmi.converted import native  # noqa: PLC0415 - imports FMPy
+        from orchestrator.devices.fmi.converted_component import native  # noqa: PLC0415 - imports FMPy
 
         return native(self.components[end.component].description).variables[end.variable].type
 
     def _carry(self, end: Endpoint, factor: float, offset: float, unit: str) -> None:
         """Have a component take or give a variable as the number, in this unit, that its connection carries."""
-        from orchestrator.devices.fmi.converted import (  # noqa: PLC0415 - as above
+        from orchestrator.devices.fmi.converted_component import (  # noqa: PLC0415 - as above
             Conversion,
             ConvertedDescription,
         )

@@ -7,7 +7,7 @@ from urllib.parse import quote
 from xml.etree.ElementTree import Element, SubElement
 
 from orchestrator.core.errors import InputError
-from orchestrator.devices.fmi.converted import native
+from orchestrator.devices.fmi.converted_component import native
 from orchestrator.systems.coupling.connections import Connection
 from orchestrator.systems.coupling.imperfections import described
 from orchestrator.systems.coupling.system import ComponentPlan, System

@@ -10,8 +10,8 @@ from orchestrator.cases.forcing import with_events
 from orchestrator.cases.networks.element_names import BranchName, ElementNames, element_names
 from orchestrator.cases.networks.sources import read_matpower, read_pandapower
 from orchestrator.core.errors import CosimError, InputError
-from orchestrator.studies.operating_points.columns import Elements
 from orchestrator.studies.operating_points.outages import read_outages
+from orchestrator.studies.operating_points.point_columns import Elements
 from orchestrator.studies.siting.candidates import candidates
 from tests.support.scenarios import prepare_one
 

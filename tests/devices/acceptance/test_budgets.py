@@ -8,7 +8,7 @@ import pytest
 
 from orchestrator.devices.acceptance import process
 from orchestrator.devices.acceptance.runner import check_fmu
-from orchestrator.devices.fmi.limits import Limits
+from orchestrator.devices.sandbox.resource_limits import Limits
 
 ASKED = ("runs", "limits")
 SLAVE = """

@@ -20,7 +20,7 @@ from orchestrator.devices.acceptance.checks.all import CHECKS, ORDER
 from orchestrator.devices.acceptance.checks.own import MODULES
 from orchestrator.devices.acceptance.checks.own import ORDER as OWN
 from orchestrator.devices.acceptance.checks.subject import OperatingAt
-from orchestrator.devices.fmi.protection import NAMES
+from orchestrator.devices.sandbox.protections_in_force import NAMES
 from orchestrator.studies.sweep.axes import parse_vary
 from orchestrator.studies.sweep.request import SweepRequest
 from orchestrator.studies.sweep.sweep import plan_sweep

@@ -11,13 +11,13 @@ from orchestrator.core.errors import ComponentError
 from orchestrator.devices.acceptance.process import FmuProcess, HostedComponent
 from orchestrator.devices.binding.binding import bind
 from orchestrator.devices.fmi.archive import extract
-from orchestrator.devices.fmi.bound import BoundComponent
+from orchestrator.devices.fmi.bound_component import BoundComponent
 from orchestrator.devices.fmi.component import RealBatch
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.fmi.instance import open_component
-from orchestrator.devices.fmi.isolation import IsolatedComponent
-from orchestrator.devices.fmi.limits import Limits
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.isolated_component import IsolatedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
+from orchestrator.devices.sandbox.resource_limits import Limits
 from tests.support.bindings import GFOR_RATED
 
 KINDS = [LoadedComponent, IsolatedComponent, BoundComponent, HostedComponent]

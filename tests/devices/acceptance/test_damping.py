@@ -11,7 +11,7 @@ from orchestrator.devices.acceptance.runner import check_fmu
 from orchestrator.devices.binding.binding import bind
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.fmi.instance import open_component
-from orchestrator.devices.fmi.limits import Limits
+from orchestrator.devices.sandbox.resource_limits import Limits
 from tests.devices.acceptance.gallery.build import build
 from tests.devices.acceptance.gallery.members import START, binding, converter, faulty
 

@@ -16,7 +16,7 @@ from fmus.toolchain.exporter import cached
 from fmus.toolchain.native_fmu import NativeFmu
 from orchestrator.devices.acceptance.checks import droop, port, ride_through
 from orchestrator.devices.acceptance.runner import check_fmu
-from orchestrator.devices.fmi.limits import Limits
+from orchestrator.devices.sandbox.resource_limits import Limits
 from orchestrator.face.api.acceptance import Acceptance
 from tests.devices.acceptance.gallery.build import build, check_macros
 from tests.devices.acceptance.gallery.hostile import HOSTILE

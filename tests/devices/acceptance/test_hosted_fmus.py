@@ -8,7 +8,7 @@ import pytest
 
 from orchestrator.devices.acceptance.checks import port
 from orchestrator.devices.acceptance.process import HostedComponent
-from orchestrator.devices.fmi import limits
+from orchestrator.devices.sandbox import resource_limits
 
 
 def test_a_hosted_fmu_is_given_one_row_of_as_many_values():
@@ -27,9 +27,9 @@ def test_a_hosted_fmu_is_given_one_row_of_as_many_values():
 def test_on_a_crowded_machine_an_answer_is_waited_for_up_to_eight_times_as_long(
     load, wanted, monkeypatch
 ):
-    monkeypatch.setattr(limits.os, "getloadavg", lambda: (load, 0.0, 0.0), raising=False)
-    monkeypatch.setattr(limits.os, "cpu_count", lambda: 2)
-    assert limits.crowded() == wanted
+    monkeypatch.setattr(resource_limits.os, "getloadavg", lambda: (load, 0.0, 0.0), raising=False)
+    monkeypatch.setattr(resource_limits.os, "cpu_count", lambda: 2)
+    assert resource_limits.crowded() == wanted
 
 
 def test_a_current_is_that_of_the_rating_with_which_it_runs(monkeypatch):

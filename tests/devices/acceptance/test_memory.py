@@ -10,7 +10,7 @@ from orchestrator.devices.acceptance.checks import resources
 from orchestrator.devices.acceptance.checks.resources import _growth, _Unknown
 from orchestrator.devices.acceptance.checks.subject import Running, Subject
 from orchestrator.devices.acceptance.runner import check_fmu
-from orchestrator.devices.fmi.limits import Limits
+from orchestrator.devices.sandbox.resource_limits import Limits
 
 
 class Memory:

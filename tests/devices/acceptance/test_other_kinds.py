@@ -5,7 +5,7 @@ import re
 import pytest
 
 from orchestrator.devices.acceptance.runner import check_fmu
-from orchestrator.devices.fmi.limits import Limits
+from orchestrator.devices.sandbox.resource_limits import Limits
 from tests.devices.acceptance.gallery.build import build
 from tests.devices.acceptance.gallery.members import (
     binding,

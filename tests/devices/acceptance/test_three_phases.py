@@ -15,7 +15,7 @@ from orchestrator.devices.acceptance.runner import check_fmu
 from orchestrator.devices.binding.binding import bind
 from orchestrator.devices.binding.draft import draft_binding
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.limits import Limits
+from orchestrator.devices.sandbox.resource_limits import Limits
 from tests.devices.acceptance.gallery.build import build, check_macros
 from tests.devices.acceptance.gallery.three_phases import honest, planted, three_phase
 

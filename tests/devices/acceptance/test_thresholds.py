@@ -9,7 +9,7 @@ import pytest
 from orchestrator.devices.acceptance.checks import points
 from orchestrator.devices.acceptance.checks.subject import Use
 from orchestrator.devices.acceptance.runner import check_fmu
-from orchestrator.devices.fmi.limits import Limits
+from orchestrator.devices.sandbox.resource_limits import Limits
 from tests.devices.acceptance.gallery.build import Source, Variable, build
 from tests.devices.acceptance.gallery.members import converter
 

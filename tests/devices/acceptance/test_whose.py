@@ -16,7 +16,7 @@ from orchestrator.devices.acceptance.runner import _REFUSED, check_fmu
 from orchestrator.devices.fmi.archive import extract
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.fmi.instance import open_component
-from orchestrator.devices.fmi.limits import Limits
+from orchestrator.devices.sandbox.resource_limits import Limits
 from tests.devices.acceptance.gallery.build import build
 from tests.devices.acceptance.gallery.hostile import other_bytes, same_bytes
 from tests.devices.acceptance.gallery.members import converter

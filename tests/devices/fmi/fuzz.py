@@ -18,9 +18,9 @@ from pathlib import Path
 from orchestrator.core.errors import FmuFileError
 from orchestrator.devices.binding.draft import draft_binding
 from orchestrator.devices.fmi.archive import extract
-from orchestrator.devices.fmi.confinement import landlock_version, restrict
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.limits import Limits, apply_limits
+from orchestrator.devices.sandbox.access_restriction import landlock_version, restrict
+from orchestrator.devices.sandbox.resource_limits import Limits, apply_limits
 
 XML = "modelDescription.xml"
 NAMES = (

@@ -39,7 +39,7 @@ _LOAD = """
 import builtins, json, sys
 from pathlib import Path
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 
 path, hook = list(sys.path), builtins.__import__
 values, parts = [], [LoadedComponent("a", read_description(Path(p))) for p in sys.argv[1:]]

@@ -14,7 +14,7 @@ import pytest
 from orchestrator.core.errors import ComponentError, InputError
 from orchestrator.devices.fmi.component import RealBatch
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 
 H = 1e-4
 

@@ -8,9 +8,9 @@ import pytest
 
 from fmus.toolchain.catalogue import build_model
 from orchestrator.core.errors import FmuFileError, InputError
-from orchestrator.devices.fmi import wine
 from orchestrator.devices.fmi.archive import extract
 from orchestrator.devices.fmi.description import VariableInfo, read_declared, read_description
+from orchestrator.devices.sandbox import wine
 from orchestrator.face.cli import main
 from orchestrator.output.report import fmu_variables
 

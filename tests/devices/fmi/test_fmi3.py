@@ -17,7 +17,7 @@ from orchestrator.core.errors import ComponentError, EndedError, FmuFileError
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.fmi.fmi3 import adapter_path
 from orchestrator.devices.fmi.instance import open_component
-from orchestrator.devices.fmi.mailbox import mailbox_library
+from orchestrator.devices.sandbox.mailbox import mailbox_library
 from orchestrator.linear.models.linearization import Blocks
 from orchestrator.studies.modes.modes import modes_of, running
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import pytest
 
-from orchestrator.devices.fmi.interrupts import calls
+from orchestrator.core.interrupts import calls
 from tests.devices.acceptance.gallery.build import build
 from tests.devices.acceptance.gallery.members import LAG, small
 
@@ -194,7 +194,7 @@ def test_sigterm_does_what_ctrl_c_does():
 
 _TWICE = """
 import signal
-from orchestrator.devices.fmi.interrupts import calls
+from orchestrator.core.interrupts import calls
 
 with calls.terminable(), calls:
     signal.raise_signal(signal.SIGTERM)
@@ -214,7 +214,7 @@ def test_a_second_sigterm_ends_the_process_at_once():
 _DEAF = """
 import signal
 signal.signal(signal.SIGINT, signal.SIG_IGN)
-from orchestrator.devices.fmi.interrupts import calls
+from orchestrator.core.interrupts import calls
 
 with calls.terminable():
     signal.raise_signal(signal.SIGINT)

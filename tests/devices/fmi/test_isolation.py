@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from fmus.toolchain.compiler import compile_library, joined_source
+from orchestrator import devices
 from orchestrator.core.errors import ComponentError, InputError
-from orchestrator.devices import fmi
 from orchestrator.devices.acceptance.runner import check_fmu
 from orchestrator.devices.fmi import instance
 from orchestrator.devices.fmi.component import RealBatch
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.fmi.instance import is_ours, open_component
-from orchestrator.devices.fmi.isolation import IsolatedComponent
-from orchestrator.devices.fmi.limits import Limits
-from orchestrator.devices.fmi.loaded import LoadedComponent
-from orchestrator.devices.fmi.process_tree import descendants
+from orchestrator.devices.fmi.isolated_component import IsolatedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
+from orchestrator.devices.sandbox.process_tree import descendants
+from orchestrator.devices.sandbox.resource_limits import Limits
 from orchestrator.systems.coupling.compiled_loop import CompiledLoop
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.recorder import Recorder
@@ -239,8 +239,8 @@ def test_both_loops_step_it(box, monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("platform", ["win64", "darwin64"])
-@pytest.mark.parametrize("source", ["mailbox.c", "port_adapter.c"])
+@pytest.mark.parametrize("source", ["sandbox/mailbox.c", "fmi/port_adapter.c"])
 def test_what_is_compiled_can_be_compiled_for_every_platform(source, platform):
     """Only compiled: it runs on the platforms that the tests run on."""
-    text = joined_source(Path(fmi.__file__).with_name(source))
+    text = joined_source(Path(devices.__file__).parent / source)
     assert compile_library(text, platform).stat().st_size > 1000

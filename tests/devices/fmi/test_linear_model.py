@@ -16,7 +16,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.core.errors import FmuFileError, InputError
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.fmi.linear_model import FOLDER, NAME, read_embedded_model
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from orchestrator.face.cli import main
 from orchestrator.linear.models.state_space import read_linear_model
 from orchestrator.linear.spectra.modes import eigenvalues

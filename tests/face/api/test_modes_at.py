@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import orchestrator as gfor
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from orchestrator.linear.models import blocks
 
 POINTS = (

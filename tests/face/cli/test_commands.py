@@ -14,8 +14,8 @@ import pytest
 import xarray as xr
 
 from orchestrator.cases.case import load_case
-from orchestrator.devices.fmi import wine
 from orchestrator.devices.fmi.description import read_description
+from orchestrator.devices.sandbox import wine
 from orchestrator.face.cli import COMMANDS, GROUPS, OLD, QUESTIONS, _command_in, _parser
 from tests.support.scenarios import prepare_one
 from tests.systems.coupling.small_fmus import small_fmu

@@ -21,7 +21,7 @@ from orchestrator.core.errors import (
     NotFiniteError,
     Problem,
 )
-from orchestrator.devices.fmi.interrupts import calls
+from orchestrator.core.interrupts import calls
 from orchestrator.face.cli import run, side_by_side
 from orchestrator.face.cli.side_by_side import SideBySide, number_of_workers
 from tests.face.cli.test_resume import checkpoints_in, finished, started, values_of, write_case

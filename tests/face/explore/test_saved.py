@@ -8,7 +8,7 @@ import pytest
 
 from orchestrator.core.errors import InputError
 from orchestrator.face.explore import saved
-from orchestrator.face.explore.between import judged_cell
+from orchestrator.face.explore.interpolation import judged_cell
 from orchestrator.face.explore.smaller import smaller_answer, smaller_parameters
 
 

@@ -10,10 +10,10 @@ import pytest
 from orchestrator.core.errors import ComponentError, ErrorKind
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.devices.fmi import instance
-from orchestrator.devices.fmi.bound import BoundComponent
+from orchestrator.devices.fmi.bound_component import BoundComponent
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.isolation import IsolatedComponent
-from orchestrator.devices.fmi.limits import Limits
+from orchestrator.devices.fmi.isolated_component import IsolatedComponent
+from orchestrator.devices.sandbox.resource_limits import Limits
 from orchestrator.studies.black_box.bench import drive
 from tests.devices.acceptance.conftest import gallery
 from tests.devices.acceptance.gallery.build import build

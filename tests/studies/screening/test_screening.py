@@ -18,9 +18,9 @@ from orchestrator.linear.spectra.mode_tracking import ModeSet
 from orchestrator.linear.spectra.modes import find_modes, least_damped_first
 from orchestrator.studies.modes.modes import compute_modes
 from orchestrator.studies.operating_points.bench import PointBench, without_references
-from orchestrator.studies.operating_points.columns import Elements
 from orchestrator.studies.operating_points.item import Item, Status
 from orchestrator.studies.operating_points.outages import read_outages
+from orchestrator.studies.operating_points.point_columns import Elements
 from orchestrator.studies.operating_points.points_file import questions_about, read_points
 from orchestrator.studies.operating_points.preparation import ItemPreparation
 from orchestrator.studies.points.dask_cluster import DaskCluster

@@ -12,9 +12,9 @@ from orchestrator.cases.flow.sharing import Reserve, SharingRule, droop_gain, po
 from orchestrator.core.errors import ErrorKind, InputError
 from orchestrator.linear.spectra.modes import find_modes
 from orchestrator.studies.modes.modes import compute_modes
-from orchestrator.studies.operating_points.columns import Elements
 from orchestrator.studies.operating_points.item import Item, Status
 from orchestrator.studies.operating_points.outages import what_remains
+from orchestrator.studies.operating_points.point_columns import Elements
 from orchestrator.studies.operating_points.preparation import ItemPreparation
 from orchestrator.studies.points.executor import Serial
 from orchestrator.studies.points.points import Work

@@ -9,7 +9,7 @@ import pytest
 
 from orchestrator.cases.scenario.catalogue_fmus import catalogue_fmu
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.isolation import IsolatedComponent
+from orchestrator.devices.fmi.isolated_component import IsolatedComponent
 from orchestrator.face.api import validation as face
 from orchestrator.studies.validation import instances
 from orchestrator.studies.validation.device import PlayedDevice

@@ -9,7 +9,7 @@ import scipy.linalg
 import xarray as xr
 
 from orchestrator.core.errors import CosimError, CouplingError, InputError
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from orchestrator.face.api.case import load
 from orchestrator.face.cli.run_tables import on_adaptive_steps
 from orchestrator.studies.runs.checkpoints import not_kept

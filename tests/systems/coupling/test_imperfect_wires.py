@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from orchestrator.core.errors import ComponentError, InputError, NotFiniteError
-from orchestrator.devices.fmi import isolation
-from orchestrator.devices.fmi.limits import Limits
+from orchestrator.devices.fmi import isolated_component
+from orchestrator.devices.sandbox.resource_limits import Limits
 from orchestrator.systems.coupling import compiled_loop as loops
 from orchestrator.systems.coupling import wire_bank
 from orchestrator.systems.coupling.events import NotANumber, Silence, WireFault, WireRecovery
@@ -323,7 +323,7 @@ def test_a_component_that_gives_no_numbers_ends_the_run_at_that_time():
 
 
 def test_a_component_that_answers_no_more_is_ended_by_the_isolations_limit(monkeypatch):
-    monkeypatch.setattr(isolation, "Limits", lambda: Limits(seconds=1.0))
+    monkeypatch.setattr(isolated_component, "Limits", lambda: Limits(seconds=1.0))
     system = ramp_into_two()
     system.components["ramp"].isolated = True
     recorder = Recorder(["sink.y"], 1)

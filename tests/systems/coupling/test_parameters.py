@@ -5,7 +5,7 @@ import pytest
 from orchestrator.core.errors import ComponentError
 from orchestrator.devices.acceptance.runner import check_fmu
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.limits import Limits
+from orchestrator.devices.sandbox.resource_limits import Limits
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.schedule import jacobi
 from orchestrator.systems.coupling.system import System

@@ -18,7 +18,7 @@ from fmus.toolchain.exporter import cached
 from fmus.toolchain.native_fmu import NativeFmu
 from orchestrator.core.errors import ComponentError, NotFiniteError
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from orchestrator.systems.coupling import compiled_loop
 from orchestrator.systems.coupling.events import ParameterChange
 from orchestrator.systems.coupling.master import Master

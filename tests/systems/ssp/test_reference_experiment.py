@@ -11,7 +11,7 @@ import pytest
 from lxml import etree
 
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from orchestrator.face.api.models import build
 from orchestrator.systems.ssp.reference_experiment import FOLDER, TOLERANCE, _purpose
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate
 
-from orchestrator.cases.networks.psse.records import NODES, Record
+from orchestrator.cases.networks.psse.raw_records import NODES, Record
 
 _DISCRETE = 1  # MODSW of a shunt that steps by its blocks
 _VOLTAGE = 1  # COD of a tap that holds a voltage

@@ -15,7 +15,7 @@ from orchestrator.cases.form.remedies import without_models
 from orchestrator.cases.networks.psse.device_flow import SolvedDevices
 from orchestrator.cases.networks.psse.devices import HeldDevice, Voltages
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, given_values
-from orchestrator.cases.networks.psse.record_values import values_of_record
+from orchestrator.cases.networks.psse.dyr_values import values_of_record
 from orchestrator.cases.networks.psse.two_terminal import CURRENT, Pole, TwoTerminal
 from orchestrator.core.errors import InputError, Problem, QuestionTopic, few, number_of
 

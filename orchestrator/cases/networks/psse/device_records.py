@@ -10,7 +10,13 @@ from orchestrator.cases.networks.psse.devices import HeldDevice
 from orchestrator.cases.networks.psse.facts_devices import BYPASSED, IMPEDANCE, FactsDevice
 from orchestrator.cases.networks.psse.induction_machines import ABSENT, Circuit, InductionMachine
 from orchestrator.cases.networks.psse.multi_terminal import MultiTerminal, Terminal
-from orchestrator.cases.networks.psse.records import NODES, RawFile, Record, elements, first_of_gne
+from orchestrator.cases.networks.psse.raw_records import (
+    NODES,
+    RawFile,
+    Record,
+    elements,
+    first_of_gne,
+)
 from orchestrator.cases.networks.psse.two_terminal import TwoTerminal
 from orchestrator.cases.networks.psse.unknown_devices import UnknownDevice
 from orchestrator.cases.networks.psse.vsc_lines import Converter, VscLine

@@ -14,6 +14,8 @@ from orchestrator.cases.networks.psse.dyr_mistakes import (
     slips,
     without_machine,
 )
+from orchestrator.cases.networks.psse.dyr_questions import doubts_of_machine
+from orchestrator.cases.networks.psse.dyr_unit_records import RECORDS_OF_UNITS
 from orchestrator.cases.networks.psse.following_converters import models_of_following
 from orchestrator.cases.networks.psse.limiter_records import place_limiters
 from orchestrator.cases.networks.psse.machine_model import (
@@ -34,8 +36,6 @@ from orchestrator.cases.networks.psse.missing_models import (
 from orchestrator.cases.networks.psse.parts_of_machines import MachineKey, PartsOfMachines
 from orchestrator.cases.networks.psse.plant_points import measured_points
 from orchestrator.cases.networks.psse.raw_network import Machine
-from orchestrator.cases.networks.psse.record_doubts import doubts_of_machine
-from orchestrator.cases.networks.psse.records_of_units import RECORDS_OF_UNITS
 from orchestrator.core.errors import InputError, first_of
 from orchestrator.core.options import Option
 

@@ -7,12 +7,12 @@ from fmus.grid_following.dyr_approximation import FIELDS, MODEL
 from fmus.wecc_renewable.dyr_records import PLANT_RECORDS
 from orchestrator.cases.form.remedies import APPROXIMATING, replacement_of, without_models
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
+from orchestrator.cases.networks.psse.dyr_unit_records import RECORDS_OF_UNITS
 from orchestrator.cases.networks.psse.machine_model import (
     KINDS_OF_CONVERTERS,
     OF_PLANTS,
     ON_SHAFT,
 )
-from orchestrator.cases.networks.psse.records_of_units import RECORDS_OF_UNITS
 from orchestrator.core.errors import few
 
 OF_NO_ORDER = dict.fromkeys(("REGFM_C1", "REGFMC1", "REGFMC1U"), "regfm_c1_phasor")

@@ -10,6 +10,7 @@ from orchestrator.cases.form.unusual_value import UnusualValue
 from orchestrator.cases.networks.data import bus_name
 from orchestrator.cases.networks.psse.dyr import machine_models
 from orchestrator.cases.networks.psse.dyr_file import OF_FACTS, DynamicRecord
+from orchestrator.cases.networks.psse.dyr_unit_records import COMPENSATORS
 from orchestrator.cases.networks.psse.limiter_records import LIMITERS
 from orchestrator.cases.networks.psse.machine_model import (
     CLASSICAL,
@@ -19,7 +20,6 @@ from orchestrator.cases.networks.psse.machine_model import (
 )
 from orchestrator.cases.networks.psse.plant_points import HELD_BUS
 from orchestrator.cases.networks.psse.raw_network import Machine, unit_labels
-from orchestrator.cases.networks.psse.records_of_units import COMPENSATORS
 from orchestrator.cases.networks.unit_row import DoubtOfRecord, UnitRow, checked
 from orchestrator.core.errors import InputError
 

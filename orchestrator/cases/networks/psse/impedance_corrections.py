@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from orchestrator.cases.networks.psse.records import SWITCHING_DEVICES, RawFile, Record
+from orchestrator.cases.networks.psse.raw_records import SWITCHING_DEVICES, RawFile, Record
 
 _LEAST_RATIO = 0.5  # below which the first T is a phase shift [degrees]
 _MOST_RATIO = 1.5  # the same of the last T, if above

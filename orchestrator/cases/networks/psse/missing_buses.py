@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from orchestrator.cases.networks.psse.records import (
+from orchestrator.cases.networks.psse.raw_records import (
     NODES,
     SWITCHING_DEVICES,
     RawFile,

@@ -13,9 +13,9 @@ from fmus.induction_machine.dyr_records import MOTOR_RECORDS, SUBSYSTEMS
 from fmus.toolchain.dyr_form import DyrRecord
 from orchestrator.cases.networks.conversion import bus_of
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, number_of_field
+from orchestrator.cases.networks.psse.dyr_values import values_of_record
 from orchestrator.cases.networks.psse.load_records import records_for
 from orchestrator.cases.networks.psse.raw_network import FileLoad
-from orchestrator.cases.networks.psse.record_values import values_of_record
 from orchestrator.core.errors import InputError, Problem, QuestionTopic, few, number_of
 
 MOTOR_NAMES = {

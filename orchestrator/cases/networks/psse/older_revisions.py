@@ -8,7 +8,7 @@ Source: the columns that MATPOWER's ``psse_parse`` lists by revision, and GridPA
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from orchestrator.cases.networks.psse.records import ADJUSTMENTS, RawFile, Record, is_number
+from orchestrator.cases.networks.psse.raw_records import ADJUSTMENTS, RawFile, Record, is_number
 from orchestrator.core.errors import InputError
 
 _FIXED_SHUNTS = 31  # first revision with fixed shunts beside the buses, and REV in the first record

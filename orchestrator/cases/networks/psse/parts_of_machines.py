@@ -6,6 +6,8 @@ from fmus.grid_following.dyr_approximation import FIELDS
 from fmus.toolchain.dyr_form import DyrRecord
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.dyr_mistakes import remedy_for
+from orchestrator.cases.networks.psse.dyr_unit_records import RECORDS_OF_UNITS
+from orchestrator.cases.networks.psse.dyr_values import values_of_record
 from orchestrator.cases.networks.psse.machine_model import (
     CLASSICAL,
     OF_PLANTS,
@@ -13,8 +15,6 @@ from orchestrator.cases.networks.psse.machine_model import (
 )
 from orchestrator.cases.networks.psse.missing_models import kind_of
 from orchestrator.cases.networks.psse.raw_network import Machine, unit_labels
-from orchestrator.cases.networks.psse.record_values import values_of_record
-from orchestrator.cases.networks.psse.records_of_units import RECORDS_OF_UNITS
 from orchestrator.core.errors import InputError
 
 MachineKey = tuple[int, str]

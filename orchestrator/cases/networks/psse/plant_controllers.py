@@ -7,8 +7,8 @@ from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from fmus.wecc_renewable.dyr_records import AT_A_UNIT, CONTROLLER, CONTROLLER_RECORD
 from orchestrator.cases.networks.measured_point import MeasuredPoint
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
+from orchestrator.cases.networks.psse.dyr_values import values_of_record
 from orchestrator.cases.networks.psse.plant_points import number_of_bus, point_of_record
-from orchestrator.cases.networks.psse.record_values import values_of_record
 from orchestrator.core.errors import InputError
 
 _BASE = "S_n"  # parameter with the base of a plant's data [MVA]; 0 in a record is the system's

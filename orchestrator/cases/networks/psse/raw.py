@@ -16,6 +16,7 @@ from orchestrator.cases.networks.psse.raw_file import read_file
 from orchestrator.cases.networks.psse.raw_loads import named_loads, read_loads, read_shunts
 from orchestrator.cases.networks.psse.raw_machines import infinite_buses, read_machines
 from orchestrator.cases.networks.psse.raw_network import RawNetwork
+from orchestrator.cases.networks.psse.raw_records import leave_out
 from orchestrator.cases.networks.psse.raw_regions import regions_of
 from orchestrator.cases.networks.psse.raw_tables import (
     BRANCH_COLUMNS,
@@ -24,7 +25,6 @@ from orchestrator.cases.networks.psse.raw_tables import (
     RawTables,
 )
 from orchestrator.cases.networks.psse.raw_uses import record_uses
-from orchestrator.cases.networks.psse.records import leave_out
 from orchestrator.cases.networks.psse.static_vars import Modelled, units_of_devices, units_of_shunts
 from orchestrator.cases.networks.source_changes import Changes
 from orchestrator.cases.networks.sources import SourceTables

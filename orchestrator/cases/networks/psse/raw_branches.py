@@ -7,11 +7,11 @@ from itertools import count
 from orchestrator.cases.networks.branch_keys import BranchKey
 from orchestrator.cases.networks.element_names import BranchName
 from orchestrator.cases.networks.psse.raw_buses import SWITCH_STATE, reactance_of_switch
-from orchestrator.cases.networks.psse.raw_tables import BUS_COLUMNS, RawTables, is_in_service
-from orchestrator.cases.networks.psse.records import (
+from orchestrator.cases.networks.psse.raw_records import (
     SWITCHING_DEVICES,
     Record,
 )
+from orchestrator.cases.networks.psse.raw_tables import BUS_COLUMNS, RawTables, is_in_service
 from orchestrator.cases.networks.psse.transformers import Transformer, star, transformers
 
 _SBASE = 100.0  # usual base [MVA]

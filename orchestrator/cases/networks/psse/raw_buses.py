@@ -3,15 +3,15 @@
 from collections.abc import Collection, Sequence
 
 from orchestrator.cases.networks.psse.raw_network import Machine
+from orchestrator.cases.networks.psse.raw_records import (
+    NODES,
+    Record,
+)
 from orchestrator.cases.networks.psse.raw_tables import (
     BUS_COLUMNS,
     OUT_OF_SERVICE,
     REFERENCE,
     RawTables,
-)
-from orchestrator.cases.networks.psse.records import (
-    NODES,
-    Record,
 )
 from orchestrator.cases.networks.psse.zero_impedances import is_joining, merged_buses, threshold
 from orchestrator.cases.networks.source_changes import Remark

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from orchestrator.cases.networks.psse.older_revisions import with_later_records
+from orchestrator.cases.networks.psse.raw_records import RawFile, read_records, text_of
 from orchestrator.cases.networks.psse.rawx import read_rawx
-from orchestrator.cases.networks.psse.records import RawFile, read_records, text_of
 
 
 def read_file(path: Path) -> RawFile:

@@ -7,8 +7,8 @@ from orchestrator.cases.networks.bus_loads import BusLoads
 from orchestrator.cases.networks.psse.controls import shunt_blocks, shunt_record
 from orchestrator.cases.networks.psse.dyr_file import ONLY_SHUNT, shunt_name
 from orchestrator.cases.networks.psse.raw_network import FileLoad
+from orchestrator.cases.networks.psse.raw_records import NODES, Record
 from orchestrator.cases.networks.psse.raw_tables import RawTables, is_in_service
-from orchestrator.cases.networks.psse.records import NODES, Record
 from orchestrator.cases.networks.source_changes import Remark
 from orchestrator.cases.networks.sources import SourceTables
 

@@ -6,13 +6,13 @@ from functools import partial
 
 from orchestrator.cases.form.remedies import with_slack
 from orchestrator.cases.networks.psse.raw_network import POWER_FACTOR, Machine
+from orchestrator.cases.networks.psse.raw_records import Record
 from orchestrator.cases.networks.psse.raw_tables import (
     ORDINARY,
     REFERENCE,
     RawTables,
     is_in_service,
 )
-from orchestrator.cases.networks.psse.records import Record
 from orchestrator.cases.networks.psse.references import (
     INFINITE_REACTANCE,
     references_without_machine,

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from orchestrator.cases.networks.psse.records import RawFile, Record
+from orchestrator.cases.networks.psse.raw_records import RawFile, Record
 from orchestrator.cases.networks.regions import Region, with_name
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import one_line

@@ -13,7 +13,7 @@ from orchestrator.cases.networks.psse.device_records import FoundDevices
 from orchestrator.cases.networks.psse.impedance_corrections import correction_tables
 from orchestrator.cases.networks.psse.missing_buses import with_known_buses
 from orchestrator.cases.networks.psse.raw_network import FileLoad
-from orchestrator.cases.networks.psse.records import (
+from orchestrator.cases.networks.psse.raw_records import (
     SWITCHING_DEVICES,
     RawFile,
     Record,

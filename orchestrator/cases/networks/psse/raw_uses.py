@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping, Sequence
 
 from orchestrator.cases.networks.psse.missing_buses import status_columns
-from orchestrator.cases.networks.psse.records import (
+from orchestrator.cases.networks.psse.raw_records import (
     ADJUSTMENTS,
     LEFT_OUT,
     NODES,

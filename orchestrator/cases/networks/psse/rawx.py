@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from orchestrator.cases.networks.psse.records import RawFile, Record
+from orchestrator.cases.networks.psse.raw_records import RawFile, Record
 from orchestrator.core.errors import InputError
 
 REVISION = 35  # whose records the tables are put into; RAWX began with it

@@ -8,7 +8,7 @@ from fmus.grid.element_data import Line
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.networks.branch_keys import BranchKey
 from orchestrator.cases.networks.psse.raw_network import Machine, unit_labels
-from orchestrator.cases.networks.psse.records import Record
+from orchestrator.cases.networks.psse.raw_records import Record
 from orchestrator.cases.networks.psse.sequence_records import SequenceFile
 from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
 from orchestrator.cases.networks.sequence_data import (

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
-from orchestrator.cases.networks.psse.records import (
+from orchestrator.cases.networks.psse.raw_records import (
     BEGIN_OF_SECTION,
     END_OF_SECTION,
     Record,

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from orchestrator.cases.networks.psse.controls import TapRecord, tap_record
-from orchestrator.cases.networks.psse.records import NODES, SWITCHING_DEVICES, RawFile, Record
+from orchestrator.cases.networks.psse.raw_records import NODES, SWITCHING_DEVICES, RawFile, Record
 
 _NAME = 10  # column of NAME in the first line
 _ZCOD = 21  # of ZCOD there, from revision 35 on

@@ -9,7 +9,7 @@ are alike to the last digit with R = 0.012 pu, and they are not where the line h
 import re
 from collections.abc import Collection, Iterable, Mapping
 
-from orchestrator.cases.networks.psse.records import RawFile, Record
+from orchestrator.cases.networks.psse.raw_records import RawFile, Record
 
 USUAL_THRESHOLD = 1e-4  # THRSHZ of a file that does not say it [pu of the system]
 _SMALLEST = (

@@ -17,7 +17,7 @@ from orchestrator.devices.acceptance.checks.damping_swings import controllers
 from orchestrator.devices.acceptance.checks.running import EQUAL
 from orchestrator.devices.acceptance.checks.subject import Subject
 from orchestrator.devices.fmi.description import runs_under_wine
-from orchestrator.devices.fmi.port import without_binding
+from orchestrator.devices.fmi.port_mapping import without_binding
 
 _STEPS = 2000
 _MINUTE = 60  # [s]

@@ -10,7 +10,7 @@ import numpy as np
 from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.devices.acceptance.checks.port import of_current, voltage_rows
 from orchestrator.devices.acceptance.checks.subject import OperatingAt, Running, Subject
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 
 _BASE = 100 * pi  # angular frequency [rad/s] by which an angle turns with 1 pu of deviation
 _HERTZ = (0.7, 1.3)  # bounds of the swing's frequency [Hz], that of oscillations between areas

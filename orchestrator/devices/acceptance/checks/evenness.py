@@ -22,7 +22,7 @@ from orchestrator.devices.acceptance.checks.events import scale
 from orchestrator.devices.acceptance.checks.port import cannot_import, followed, without_start
 from orchestrator.devices.acceptance.checks.settings import Setting, with_each_setting
 from orchestrator.devices.acceptance.checks.subject import OperatingAt, Subject
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 
 _LASTS = 2.0  # time [s] for which its answer to 0.1 % less frequency is looked at
 _SOME = 5e-3  # answer [pu, S_n] from which it is compared

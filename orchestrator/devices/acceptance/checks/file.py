@@ -17,7 +17,7 @@ from orchestrator.devices.acceptance.checks.base import (
 from orchestrator.devices.acceptance.checks.subject import Subject
 from orchestrator.devices.fmi.archive import MODEL_DESCRIPTION
 from orchestrator.devices.fmi.description import FmuDescription, VariableInfo
-from orchestrator.devices.fmi.port import without_binding
+from orchestrator.devices.fmi.port_mapping import without_binding
 from orchestrator.devices.fmi.validation import validation_problems
 
 _SOME = 3

@@ -24,7 +24,7 @@ from orchestrator.devices.acceptance.checks.settings import (
     with_each_setting,
 )
 from orchestrator.devices.acceptance.checks.subject import OperatingAt, Stimulus, Subject
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 
 OTHER_POINT = OperatingAt(v=1.03, theta=0.4, P=0.7, Q=-0.1)
 """Where the other instance lives: off the usual operating point, so that what it leaves behind shows."""

@@ -26,9 +26,9 @@ from orchestrator.devices.acceptance.checks.port import POINTS
 from orchestrator.devices.acceptance.checks.running import affordable
 from orchestrator.devices.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.devices.acceptance.process import HostedComponent, ProcessEndedError
-from orchestrator.devices.fmi.answers import names
 from orchestrator.devices.fmi.component import RealBatch
-from orchestrator.devices.fmi.port import without_binding
+from orchestrator.devices.fmi.port_mapping import without_binding
+from orchestrator.devices.sandbox.answer_forms import names
 
 
 @check("loads", "Can its binary be loaded here, and does it give an instance?")

@@ -24,7 +24,7 @@ from orchestrator.devices.acceptance.checks.sequences import (
 from orchestrator.devices.acceptance.checks.subject import Running, Subject
 from orchestrator.devices.acceptance.linear_network import LinearNetwork
 from orchestrator.devices.fmi.component import RealBatch
-from orchestrator.devices.fmi.port import BoundDescription, Form
+from orchestrator.devices.fmi.port_mapping import BoundDescription, Form
 
 SCR = 10.0
 """Short-circuit ratio of the source's impedance, as in the bench of `gfor certify --code`."""

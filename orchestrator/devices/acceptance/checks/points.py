@@ -34,7 +34,7 @@ from orchestrator.devices.acceptance.checks.port import (
 from orchestrator.devices.acceptance.checks.running import affordable
 from orchestrator.devices.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.devices.binding.misfits import BALANCE, NO_LIMIT
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 
 _IDLE = OperatingAt(1.0, 0.1, 0.0, 0.0)
 _FULL = (OperatingAt(1.02, 0.2, 1.0, 0.0), OperatingAt(1.02, -0.3, -1.0, 0.0))

@@ -23,7 +23,7 @@ from orchestrator.devices.acceptance.checks.running import LONGEST, RUN_FOR, aff
 from orchestrator.devices.acceptance.checks.subject import OperatingAt, Running, Subject
 from orchestrator.devices.binding.misfits import BALANCE, diagnosis, power_seen
 from orchestrator.devices.fmi.component import RealBatch
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 
 POINTS = (
     OperatingAt(1.0, 0.0, 0.5, 0.1),

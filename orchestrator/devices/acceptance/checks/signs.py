@@ -30,7 +30,7 @@ from orchestrator.devices.binding.misfits import (
     of_frequency,
     omega_seen,
 )
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 
 _LASTS = 3.0  # time in which an answer settles [s]
 _MOST_TIME = 1.0  # of one answer [s of a usual FMU]

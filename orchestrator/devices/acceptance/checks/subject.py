@@ -16,7 +16,7 @@ from orchestrator.devices.acceptance.linear_network import LinearNetwork
 from orchestrator.devices.acceptance.process import FmuProcess, HostedComponent
 from orchestrator.devices.fmi.component import RealBatch
 from orchestrator.devices.fmi.description import FmuDescription
-from orchestrator.devices.fmi.port import START, BoundDescription
+from orchestrator.devices.fmi.port_mapping import START, BoundDescription
 
 Stimulus = Callable[[float], Numbers]  # time [s] → the inputs' deviations from where they start
 STEPS_IN_A_ROUND = 4096  # random inputs, after which they come again

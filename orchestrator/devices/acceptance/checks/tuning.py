@@ -21,7 +21,7 @@ from orchestrator.devices.acceptance.checks.port import voltage_rows
 from orchestrator.devices.acceptance.checks.running import affordable
 from orchestrator.devices.acceptance.checks.settings import elsewhere, settings
 from orchestrator.devices.acceptance.checks.subject import Subject
-from orchestrator.devices.fmi.port import START
+from orchestrator.devices.fmi.port_mapping import START
 
 _MOST = 24  # parameters that are tried, drawn at random where there are more
 _STEPS = 200

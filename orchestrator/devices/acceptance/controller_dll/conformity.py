@@ -12,7 +12,7 @@ from orchestrator.devices.acceptance.controller_dll.results import (
     not_applicable,
 )
 from orchestrator.devices.acceptance.controller_dll.subject import DllSubject, ErrorInRunError
-from orchestrator.devices.fmi.dll_process import DllEndedError, DllNotLoadedError
+from orchestrator.devices.sandbox.dll_process import DllEndedError, DllNotLoadedError
 
 _MODULES = (declared, kept, timed)  # which enter their checks
 _BEFORE_ALL = ("dll_file", "dll_declarations", "dll_first_call")

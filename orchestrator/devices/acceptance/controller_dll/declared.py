@@ -14,7 +14,7 @@ from orchestrator.devices.acceptance.controller_dll.results import (
     remarked,
 )
 from orchestrator.devices.acceptance.controller_dll.subject import DllSubject
-from orchestrator.devices.fmi.dll_process import DllNotLoadedError
+from orchestrator.devices.sandbox.dll_process import DllNotLoadedError
 
 _NAME_IN_C = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _LOADED_HERE = {"linux": ("ELF", "PE"), "win32": ("PE",), "darwin": ("Mach-O",)}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from fmus.vendor_dll.interface import DllInterface, Place, layout
 from fmus.vendor_dll.state_trial import InstanceStructure, moving_input, pack_value
-from orchestrator.devices.fmi.dll_process import DllProcess, Order
+from orchestrator.devices.sandbox.dll_process import DllProcess, Order
 
 ARRAYS = ("inputs", "outputs", "parameters", "integer states", "float states", "double states")
 INPUTS = 0  # place among `ARRAYS`

@@ -16,7 +16,7 @@ from orchestrator.devices.acceptance.controller_dll.subject import (
     DllSubject,
     differs,
 )
-from orchestrator.devices.fmi.dll_process import DllEndedError
+from orchestrator.devices.sandbox.dll_process import DllEndedError
 
 _EVERYWHERE = tuple(range(len(ARRAYS)))
 _SIDES = {True: "behind", False: "before"}

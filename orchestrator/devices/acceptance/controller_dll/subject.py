@@ -17,7 +17,7 @@ from orchestrator.devices.acceptance.controller_dll.host import (
     Placement,
     Session,
 )
-from orchestrator.devices.fmi.dll_process import DllProcess
+from orchestrator.devices.sandbox.dll_process import DllProcess
 
 _STEP = 1e-4  # between two samples of a DLL that declares no sample time [s]
 

@@ -19,7 +19,7 @@ from orchestrator.devices.acceptance.controller_dll.subject import (
     DllSubject,
     differs,
 )
-from orchestrator.devices.fmi.dll_process import DllEndedError
+from orchestrator.devices.sandbox.dll_process import DllEndedError
 
 _LEAST_PERIODS = 5  # of a sample time of its own, from which it is told
 _CLOSE = 1e-6  # part of an output's range in which two runs with slightly other times agree

@@ -17,7 +17,7 @@ from orchestrator.core.errors import ComponentError, CosimError, ErrorKind
 from orchestrator.core.safe_files import write_text
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.devices.fmi.description import FmuDescription
-from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.port_mapping import BoundDescription
 from orchestrator.linear.models.device_start import misfits_of
 from orchestrator.simulation.watch.finding import UNSTABLE, Finding
 from orchestrator.simulation.watch.watch import Watch

@@ -12,8 +12,8 @@ from orchestrator.linear.models.coupled_state import CoupledState
 from orchestrator.linear.models.linear_model import HELD
 from orchestrator.linear.models.linearization import Blocks, compose, continuous
 from orchestrator.studies.modes.modes import ModesResult, compute_modes
-from orchestrator.studies.operating_points.columns import Elements
 from orchestrator.studies.operating_points.outages import read_outages, what_remains
+from orchestrator.studies.operating_points.point_columns import Elements
 from orchestrator.studies.runs.after_events import modes_after
 from orchestrator.systems.coupling.master import Master
 from tests.cases.networks.psse import raw, records

@@ -9,12 +9,12 @@ import pytest
 from orchestrator.cases.networks.psse import missing_models
 from orchestrator.cases.networks.psse.dyr import machine_models
 from orchestrator.cases.networks.psse.dyr_file import read_dyr
+from orchestrator.cases.networks.psse.dyr_model_list import known_records
 from orchestrator.cases.networks.psse.dyr_units import without_idle_controls
 from orchestrator.cases.networks.psse.dyr_uses import record_uses
 from orchestrator.cases.networks.psse.machine_model import COMPENSATION
 from orchestrator.cases.networks.psse.missing_models import kind_of, reason_of_device
 from orchestrator.cases.networks.psse.raw_network import Machine
-from orchestrator.cases.networks.psse.record_catalogue import known_records
 from orchestrator.cases.networks.psse.unused_models import unused_models
 from orchestrator.cases.networks.record_use import UseOfRecord, in_one_line
 from orchestrator.cases.networks.unit_row import UnitRow

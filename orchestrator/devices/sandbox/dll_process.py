@@ -16,10 +16,10 @@ from typing import Any
 
 from fmus.toolchain.temporary import own_folder, remove
 from orchestrator.core.errors import CosimError
-from orchestrator.devices.fmi.limits import TO_BEGIN, crowded
+from orchestrator.devices.sandbox.resource_limits import TO_BEGIN, crowded
 
 Order = list[Any]
-"""A command of `dll_worker` and its arguments."""
+"""A command of `dll_process_worker` and its arguments."""
 
 _MOST = 64 * 1024**2  # of one answer, for which a DLL could be the author [bytes]
 _TO_LOAD = 30.0  # for a DLL to be loaded, its own code among it [s]
@@ -71,7 +71,7 @@ class DllProcess:
             json.dumps(list((texts or {}).values())),
         ]
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "orchestrator.devices.fmi.dll_worker", *words],
+            [sys.executable, "-m", "orchestrator.devices.sandbox.dll_process_worker", *words],
             cwd=self._folder,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,

@@ -9,8 +9,8 @@ from pathlib import Path
 from fmus.vendor_dll.memory import LocalLibrary
 from fmus.vendor_dll.reading import answer_for, texts_in
 from orchestrator.core.errors import InputError
-from orchestrator.devices.fmi import wine
-from orchestrator.devices.fmi.confinement import LAYERS, Means, confine
+from orchestrator.devices.sandbox import wine
+from orchestrator.devices.sandbox.access_restriction import LAYERS, Means, confine
 
 
 def _files(texts: dict[str, str] | None) -> list[Path]:
@@ -26,7 +26,7 @@ def _read(library: Path, answer: Path, texts: dict[str, str] | None) -> None:
 
 
 def _read_under_wine(library: Path, answer: Path, texts: dict[str, str] | None) -> None:
-    from orchestrator.devices.fmi.wine_program import WineLibrary, compile_programs  # noqa: PLC0415 - numpy, for others in vain
+    from orchestrator.devices.sandbox.wine_program import WineLibrary, compile_programs  # noqa: PLC0415 - numpy, for others in vain
 
     try:
         programs = compile_programs()

@@ -1,7 +1,7 @@
 """Limits of a process that runs a foreign FMU; called once, in that process, before the FMU is loaded.
 
 These are the limits that the kernel keeps for each process. Those on all of an FMU's processes together are kept by
-`supervisor`, what they may touch by `confinement`. On Windows, only time and messages are limited."""
+`supervisor`, what they may touch by `access_restriction`. On Windows, only time and messages are limited."""
 
 import os
 import signal
@@ -9,7 +9,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestrator.devices.fmi.protection import CPU, DISK, MEMORY, TASKS
+from orchestrator.devices.sandbox.protections_in_force import CPU, DISK, MEMORY, TASKS
 
 _OUR_TASKS = 3  # processes of ours around an FMU that count as its own
 # timers and queued signals, which the kernel counts for the whole user
@@ -23,6 +23,7 @@ TOO_MUCH_MEMORY = 93
 TOO_MANY_TASKS = 94
 TOO_MUCH_DISK = 95
 """Exit codes of a supervisor that ended an FMU's processes for what they took together."""
+FLOODED = 97  # exit code of a process whose FMU logs without end
 
 
 def crowded() -> float:

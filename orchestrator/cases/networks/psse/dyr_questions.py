@@ -5,9 +5,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from fmus.grid_following.dyr_approximation import FIELDS
 from fmus.synchronous_generator.dyr_records import DYR_RECORDS
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, given_values
+from orchestrator.cases.networks.psse.dyr_unit_records import RECORDS_OF_UNITS
+from orchestrator.cases.networks.psse.dyr_values import CEILING, FLOOR, chosen_ceiling
 from orchestrator.cases.networks.psse.raw_network import Machine
-from orchestrator.cases.networks.psse.record_values import CEILING, FLOOR, chosen_ceiling
-from orchestrator.cases.networks.psse.records_of_units import RECORDS_OF_UNITS
 from orchestrator.cases.networks.unit_row import DoubtOfRecord
 
 _LEAST_SIGNALS = ("uel.V_UIMIN", "uel.V_ULMIN")

@@ -9,9 +9,9 @@ from importlib import import_module
 
 import pytest
 
+from orchestrator.core import interrupts as deferral
 from orchestrator.core.errors import ResultsError
-from orchestrator.devices.fmi import interrupts as deferral
-from orchestrator.devices.fmi.interrupts import calls
+from orchestrator.core.interrupts import calls
 from orchestrator.face.cli import info
 
 LIBRARY = """
@@ -198,7 +198,7 @@ def test_an_error_without_a_signal_stays_what_it_is(gfor, monkeypatch):
 
 _TWICE = """
 import signal
-from orchestrator.devices.fmi.interrupts import calls
+from orchestrator.core.interrupts import calls
 
 library, ours = {"__name__": "library", "signal": signal}, {"__name__": "orchestrator.planted"}
 twice = "def twice():\\n for k in range(2):\\n  signal.raise_signal(signal.SIGTERM)\\n  print(k, flush=True)"

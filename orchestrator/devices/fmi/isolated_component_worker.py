@@ -9,13 +9,13 @@ from typing import Any
 
 from orchestrator.core.errors import ComponentError, CosimError, UnsupportedFmuError
 from orchestrator.devices.fmi.component import Component
-from orchestrator.devices.fmi.confinement import Means, protections
 from orchestrator.devices.fmi.description import FmuDescription, read_description
 from orchestrator.devices.fmi.instance import compile_adapters
-from orchestrator.devices.fmi.limits import Limits, apply_limits
-from orchestrator.devices.fmi.loaded import LoadedComponent
-from orchestrator.devices.fmi.mailbox import DIED, OK, Mailbox
+from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from orchestrator.devices.fmi.messages import on_message
+from orchestrator.devices.sandbox.access_restriction import Means, protections
+from orchestrator.devices.sandbox.mailbox import DIED, OK, Mailbox
+from orchestrator.devices.sandbox.resource_limits import Limits, apply_limits
 
 _PASSED_ON = frozenset(
     (

@@ -5,9 +5,8 @@ import signal
 import pytest
 
 from orchestrator.devices.acceptance.checks.base import REMEDIES
-from orchestrator.devices.fmi.confined import ProcessFault, fault_of_exit, last_line
-from orchestrator.devices.fmi.limits import Limits
-from orchestrator.devices.fmi.messages import FLOODED
+from orchestrator.devices.sandbox.process_end import ProcessFault, fault_of_exit, last_line
+from orchestrator.devices.sandbox.resource_limits import FLOODED, Limits
 
 GIVEN_UP = (ProcessFault.HANG, ProcessFault.TAMPERING, ProcessFault.LEFT)
 """What gfor sees from outside and ends; the others are told by how the process ended."""

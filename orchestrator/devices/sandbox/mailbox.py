@@ -12,8 +12,8 @@ import numpy as np
 
 from fmus.toolchain.compiler import compile_here
 from orchestrator.core.errors import InputError
+from orchestrator.core.interrupts import calls
 from orchestrator.core.options import Option
-from orchestrator.devices.fmi.interrupts import calls
 
 _SOURCE = Path(__file__).with_name("mailbox.c")
 _TEXT, _LOG = 1 << 24, 8192

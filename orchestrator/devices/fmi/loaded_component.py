@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from fmus.toolchain.removal import remove_tree
 from orchestrator.core.errors import ComponentError, FmuFileError, InputError, UnsupportedFmuError
+from orchestrator.core.interrupts import calls
 from orchestrator.devices.fmi.archive import MODEL_DESCRIPTION, extract
 from orchestrator.devices.fmi.binary import (
     FMU2Tolerant,
@@ -27,12 +28,11 @@ from orchestrator.devices.fmi.brought_modules import brought_by
 from orchestrator.devices.fmi.component import Derived, RealBatch
 from orchestrator.devices.fmi.description import FmuDescription, runs_under_wine
 from orchestrator.devices.fmi.fmi3 import Fmi3Library, adapter_path
-from orchestrator.devices.fmi.interrupts import calls
+from orchestrator.devices.fmi.interpreter_turn import turn
 from orchestrator.devices.fmi.messages import Messages, callbacks_for, texts
-from orchestrator.devices.fmi.refusal import FATAL, check_log, in_its_words, refusal
-from orchestrator.devices.fmi.turn import turn
-from orchestrator.devices.fmi.wine import NoWineError
-from orchestrator.devices.fmi.wine_program import WineProgram, proxy_path
+from orchestrator.devices.fmi.refused_calls import FATAL, check_log, in_its_words, refusal
+from orchestrator.devices.sandbox.wine import NoWineError
+from orchestrator.devices.sandbox.wine_program import WineProgram, proxy_path
 
 # why one thread alone steps an FMU: Python's lock lets one thread run at a time
 PYTHON_BACKED = "Python-backed"

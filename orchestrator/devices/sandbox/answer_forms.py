@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.core.errors import ComponentError, InputError, UnsupportedFmuError
-from orchestrator.devices.fmi.protection import Protection
+from orchestrator.devices.sandbox.protections_in_force import Protection
 
 _MOST_TEXT = 4000  # characters of a text that are passed on
 

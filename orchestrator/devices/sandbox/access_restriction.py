@@ -1,7 +1,7 @@
 """Confinement of the process of a foreign FMU: closed once, by itself, before it has a second thread or any library.
 
-Several means of Linux overlap: namespaces (`namespaces`), Landlock, a filter of system calls (`seccomp`), and no
-capabilities. Each is used where the machine has it; `protections` says what they come to.
+Several means of Linux overlap: namespaces (`namespaces`), Landlock, a filter of system calls (`system_call_filter`),
+and no capabilities. Each is used where the machine has it; `protections` says what they come to.
 
 Under Landlock a process and all that it starts open nothing but the files that they were granted. Which rights there
 are depends on the kernel: files since 5.13, TCP since 6.7, signals and abstract sockets since 6.12. It binds the thread
@@ -16,14 +16,14 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from orchestrator.devices.fmi import protection, wine
-from orchestrator.devices.fmi.linux import (
+from orchestrator.devices.sandbox import protections_in_force, wine
+from orchestrator.devices.sandbox.kernel_calls import (
     call,
     drop_capabilities,
     no_new_privileges,
     on_known_machine,
 )
-from orchestrator.devices.fmi.seccomp import filter_calls
+from orchestrator.devices.sandbox.system_call_filter import filter_calls
 
 # numbers of Landlock's system calls, from linux/unistd.h: the same on all architectures since Linux 5.13
 _CREATE_RULESET = 444
@@ -217,7 +217,9 @@ def python_folders() -> list[Path]:
     return sorted(path for path in found if path != home and path not in home.parents)
 
 
-def protections(means: Means, lacking: Iterable[str]) -> tuple[protection.Protection, ...]:
+def protections(
+    means: Means, lacking: Iterable[str]
+) -> tuple[protections_in_force.Protection, ...]:
     spaces, filtered, linux = not means.namespaces, not means.seccomp, sys.platform == "linux"
     landlock, files = means.landlock or "", "read-only mounts"
     no_spaces = f"no namespaces: {means.namespaces}"
@@ -228,19 +230,19 @@ def protections(means: Means, lacking: Iterable[str]) -> tuple[protection.Protec
         return bool(used), " and ".join(used) if used else otherwise
 
     found = {
-        protection.END: first(
+        protections_in_force.END: first(
             (spaces and means.supervised, "a process namespace"),
             (not spaces and means.supervised and linux, "a supervisor that adopts orphans"),
             (means.supervised and not linux, "a supervisor, for its process group only"),
             otherwise="nobody watches over it",
         ),
-        protection.PROCESSES: first(
+        protections_in_force.PROCESSES: first(
             (spaces, "a process namespace"),
             (means.version >= 6, "Landlock"),
             (filtered and not spaces and means.version < 6, "a filter of system calls"),
             otherwise=no_spaces,
         ),
-        protection.NETWORK: first(
+        protections_in_force.NETWORK: first(
             (filtered, "a filter of system calls"),
             otherwise=(
                 f"sockets of a path only are left open; {means.seccomp}"
@@ -248,33 +250,35 @@ def protections(means: Means, lacking: Iterable[str]) -> tuple[protection.Protec
                 else f"no filter: {means.seccomp}"
             ),
         ),
-        protection.WRITING: first(
+        protections_in_force.WRITING: first(
             (not landlock, "Landlock"), (means.read_only, files), otherwise=no_landlock
         ),
-        protection.ATTRIBUTES: first(
+        protections_in_force.ATTRIBUTES: first(
             (means.read_only, files),
             (filtered and not means.read_only, "a filter of system calls"),
             otherwise=no_spaces,
         ),
-        protection.READING: first((not landlock, "Landlock"), otherwise=no_landlock),
-        protection.ENVIRONMENT: (True, "a new environment"),
-        protection.MEMORY: first(
+        protections_in_force.READING: first((not landlock, "Landlock"), otherwise=no_landlock),
+        protections_in_force.ENVIRONMENT: (True, "a new environment"),
+        protections_in_force.MEMORY: first(
             (True, "a limit for each process"),
             (linux and means.supervised, "a watch over their sum"),
             otherwise="",
         ),
-        protection.DISK: first(
+        protections_in_force.DISK: first(
             (True, "a limit for each file"),
             (means.read_only, "a folder in memory of limited size"),
             (linux and means.supervised and not means.read_only, "a watch over their sum"),
             otherwise="",
         ),
-        protection.TASKS: first(
+        protections_in_force.TASKS: first(
             (spaces, "limits of its namespaces"),
             (linux and means.supervised, "a watch"),
             otherwise="nothing on this system limits it",
         ),
-        protection.CPU: (True, "a limit for each process"),
+        protections_in_force.CPU: (True, "a limit for each process"),
     }
     found |= dict.fromkeys(lacking, (False, "this system does not limit it"))
-    return protection.in_order(protection.Protection(name, *said) for name, said in found.items())
+    return protections_in_force.in_order(
+        protections_in_force.Protection(name, *said) for name, said in found.items()
+    )

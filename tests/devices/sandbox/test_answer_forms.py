@@ -2,7 +2,7 @@
 
 import pytest
 
-from orchestrator.devices.fmi.answers import NotAnAnswerError, content_of
+from orchestrator.devices.sandbox.answer_forms import NotAnAnswerError, content_of
 
 
 @pytest.mark.parametrize("answer", [{}, {"result": 1, "done": 2}, ["result"], None, "result", 3])

@@ -21,16 +21,21 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from fmus.toolchain.removal import remove_tree
-from orchestrator.devices.fmi import linux, wine
-from orchestrator.devices.fmi.confinement import Means, confine
-from orchestrator.devices.fmi.limits import TOO_MANY_TASKS, TOO_MUCH_DISK, TOO_MUCH_MEMORY, Limits
-from orchestrator.devices.fmi.process_tree import (
+from orchestrator.devices.sandbox import kernel_calls, wine
+from orchestrator.devices.sandbox.access_restriction import Means, confine
+from orchestrator.devices.sandbox.process_tree import (
     descendants,
     end_descendants,
     size_of,
     size_of_removed,
     started_by_fmu,
     usage,
+)
+from orchestrator.devices.sandbox.resource_limits import (
+    TOO_MANY_TASKS,
+    TOO_MUCH_DISK,
+    TOO_MUCH_MEMORY,
+    Limits,
 )
 
 _MOUNT_SETATTR, _HERE, _RECURSIVE, _READ_ONLY = 442, -100, 0x8000, 0x1
@@ -47,7 +52,12 @@ _SHARED = 16 * 1024**2
 def enter_namespaces() -> None:
     """Go into new namespaces: users, network and System V's objects for this process, processes for its children."""
     user, group = os.geteuid(), os.getegid()
-    linux.unshare(linux.NEW_USER | linux.NEW_PROCESSES | linux.NEW_NETWORK | linux.NEW_IPC)
+    kernel_calls.unshare(
+        kernel_calls.NEW_USER
+        | kernel_calls.NEW_PROCESSES
+        | kernel_calls.NEW_NETWORK
+        | kernel_calls.NEW_IPC
+    )
     own = Path("/proc/self")
     (own / "setgroups").write_text("deny", encoding="ascii")
     (own / "uid_map").write_text(f"{user} {user} 1", encoding="ascii")
@@ -60,18 +70,18 @@ def mount_read_only(folder: Path, size: int, more: Iterable[Path] = ()) -> list[
     ``folder``: where that folder is put, empty.
     ``size``: what it may hold [bytes].
     ``more``: folders in whose place there is an empty one in memory as well."""
-    linux.unshare(linux.NEW_MOUNTS)
-    linux.mount(None, "/", None, _PRIVATE | _ALL_BELOW)
+    kernel_calls.unshare(kernel_calls.NEW_MOUNTS)
+    kernel_calls.mount(None, "/", None, _PRIVATE | _ALL_BELOW)
     sizes = {folder: size, Path("/dev/shm"): min(size, _SHARED)} | dict.fromkeys(
         more, min(size, _SHARED)
     )
     own = [path for path in sizes if path.is_dir()]
     for path in own:
         options = f"size={sizes[path]},nr_inodes={_MOST_FILES},mode=0700"
-        linux.mount("tmpfs", str(path), "tmpfs", _NO_SETUID | _NO_DEVICES, options)
+        kernel_calls.mount("tmpfs", str(path), "tmpfs", _NO_SETUID | _NO_DEVICES, options)
     missing = []
     try:
-        linux.mount("proc", "/proc", "proc", _NO_SETUID | _NO_DEVICES)
+        kernel_calls.mount("proc", "/proc", "proc", _NO_SETUID | _NO_DEVICES)
         with contextlib.suppress(OSError):  # since 6.14 each namespace has numbers of its own
             Path("/proc/sys/kernel/pid_max").write_text(str(_FEWEST_NUMBERS), encoding="ascii")
     except OSError:  # a container that hides a part of /proc forbids it
@@ -86,7 +96,7 @@ def mount_read_only(folder: Path, size: int, more: Iterable[Path] = ()) -> list[
 
 
 def _set_attributes(path: Path, flags: int, on: int, off: int) -> None:
-    linux.call(
+    kernel_calls.call(
         _MOUNT_SETATTR, _HERE, os.fsencode(path), flags, struct.pack("<QQQQ", on, off, 0, 0), 32
     )
 
@@ -109,7 +119,7 @@ def main(request: dict[str, Any]) -> None:
     means.namespaces = "left out"
     if "namespaces" in request["layers"]:
         means.namespaces = _entered()
-    linux.adopt_orphans()
+    kernel_calls.adopt_orphans()
     told, tell = os.pipe()
     alive, living = os.pipe()
     keeper = os.fork()
@@ -204,7 +214,7 @@ def _end_as(status: int) -> NoReturn:
 def _keep(request: dict[str, Any], means: Means, work: Path, tell: int, alive: int) -> NoReturn:
     """Start the worker, reap all that ends, tell how the worker ended, and end with it."""
     if _LINUX:
-        linux.die_with_parent(signal.SIGKILL)
+        kernel_calls.die_with_parent(signal.SIGKILL)
         if select.select([alive], [], [], 0)[0]:  # the supervisor ended before that
             _exit()
     _attach(Path(os.devnull), 0)
@@ -218,14 +228,14 @@ def _keep(request: dict[str, Any], means: Means, work: Path, tell: int, alive: i
             )
         except OSError:
             pass  # `confine` knows what that leaves open
-    linux.adopt_orphans()
+    kernel_calls.adopt_orphans()
     me = os.getpid()
     worker = os.fork()
     if not worker:
         os.close(tell)
         os.close(alive)
         if _LINUX:
-            linux.die_with_parent(signal.SIGKILL)
+            kernel_calls.die_with_parent(signal.SIGKILL)
             if os.getppid() != me:
                 _exit()
         _work(request, means)

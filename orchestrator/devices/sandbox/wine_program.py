@@ -14,8 +14,8 @@ from fmus.toolchain.compiler import TARGETS, compile_for, compile_here, joined_s
 from fmus.toolchain.temporary import own_folder, remove
 from fmus.vendor_dll.memory import LibraryEndedError, Note, Region, unheard
 from orchestrator.core.errors import InputError
-from orchestrator.devices.fmi import wine
-from orchestrator.devices.fmi.mailbox import DIED, HUNG, Client, mailbox_library
+from orchestrator.devices.sandbox import wine
+from orchestrator.devices.sandbox.mailbox import DIED, HUNG, Client, mailbox_library
 
 _HERE = Path(__file__).parent
 _BOTH = (_HERE / "mailbox.c", _HERE / "wine_talk.c")

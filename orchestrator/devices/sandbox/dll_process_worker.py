@@ -16,9 +16,9 @@ from typing import Any
 from fmus.vendor_dll.memory import Library, LocalLibrary, Note
 from fmus.vendor_dll.reading import read_interface
 from orchestrator.core.errors import InputError
-from orchestrator.devices.fmi import wine
-from orchestrator.devices.fmi.confinement import LAYERS, Means, confine
-from orchestrator.devices.fmi.limits import Limits, apply_limits
+from orchestrator.devices.sandbox import wine
+from orchestrator.devices.sandbox.access_restriction import LAYERS, Means, confine
+from orchestrator.devices.sandbox.resource_limits import Limits, apply_limits
 
 PAGE = 4096  # the smallest page of the machines that are known [bytes]
 _READ_WRITE = (
@@ -173,7 +173,7 @@ def _loaded(library: Path, folder: Path, texts: list[str], note: Note) -> Librar
         apply_limits(Limits(), folder, own_users=True)
         confine(Means(), LAYERS, folder, [library, *files])
         return LocalLibrary(library, note)
-    from orchestrator.devices.fmi.wine_program import WineLibrary, compile_programs  # noqa: PLC0415 - numpy, for others in vain
+    from orchestrator.devices.sandbox.wine_program import WineLibrary, compile_programs  # noqa: PLC0415 - numpy, for others in vain
 
     programs = compile_programs()
     confine(Means(), LAYERS, folder, [library, *programs, *files], windows=True)

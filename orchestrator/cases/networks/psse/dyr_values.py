@@ -10,7 +10,7 @@ from fmus.toolchain.dyr_form import (
 )
 from orchestrator.cases.form.remedies import APPROXIMATING, without_models
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, given_values
-from orchestrator.cases.networks.psse.records_of_units import RECORDS_OF_UNITS
+from orchestrator.cases.networks.psse.dyr_unit_records import RECORDS_OF_UNITS
 from orchestrator.core.errors import InputError
 
 _BUS = "BUSR"

@@ -11,7 +11,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from orchestrator.devices.fmi.linux import call, no_new_privileges
+from orchestrator.devices.sandbox.kernel_calls import call, no_new_privileges
 
 _ARCHITECTURES = {"x86_64": 0xC000003E, "aarch64": 0xC00000B7}
 _SECCOMP = {"x86_64": 317, "aarch64": 277}

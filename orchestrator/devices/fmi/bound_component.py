@@ -13,9 +13,15 @@ from typing import Any, NoReturn
 from fmus.toolchain.compiler import compile_here
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.core.errors import ComponentError, InputError, NotFiniteError
+from orchestrator.core.interrupts import calls
 from orchestrator.devices.fmi.component import Component, Derived, RealBatch
-from orchestrator.devices.fmi.interrupts import calls
-from orchestrator.devices.fmi.port import PORT, START, BoundDescription, PhasorMap, SignalMap
+from orchestrator.devices.fmi.port_mapping import (
+    PORT,
+    START,
+    BoundDescription,
+    PhasorMap,
+    SignalMap,
+)
 
 _SOURCE = Path(__file__).with_name("port_adapter.c")
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from orchestrator.devices.fmi.linux import die_with_parent
+from orchestrator.devices.sandbox.kernel_calls import die_with_parent
 
 PLATFORM = "win64"  # FMI's name of the platform whose libraries Wine runs
 _LOADERS = ("wine64", "/usr/lib/wine/wine64", "wine")

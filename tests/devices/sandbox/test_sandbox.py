@@ -1,7 +1,7 @@
 """Foreign FMUs that do harm on purpose: nothing outside of their own folder notices.
 
 Each is tried with every protection that this machine has, and again without namespaces, as in a container that forbids
-them. `pytest tests/devices/fmi/test_sandbox.py -s -k lists` prints what this machine lacks.
+them. `pytest tests/devices/sandbox/test_sandbox.py -s -k lists` prints what this machine lacks.
 """
 
 import errno
@@ -20,14 +20,18 @@ import pytest
 
 from orchestrator.core.errors import ComponentError
 from orchestrator.devices.acceptance.runner import check_fmu
-from orchestrator.devices.fmi import confined, process_tree, protection, seccomp
 from orchestrator.devices.fmi.component import RealBatch
-from orchestrator.devices.fmi.confinement import LAYERS, Means, protections
 from orchestrator.devices.fmi.description import read_description
-from orchestrator.devices.fmi.isolation import IsolatedComponent
-from orchestrator.devices.fmi.limits import Limits
-from orchestrator.devices.fmi.process_tree import descendants, started_by_fmu
-from orchestrator.devices.fmi.protection import (
+from orchestrator.devices.fmi.isolated_component import IsolatedComponent
+from orchestrator.devices.sandbox import (
+    foreign_process,
+    process_tree,
+    protections_in_force,
+    system_call_filter,
+)
+from orchestrator.devices.sandbox.access_restriction import LAYERS, Means, protections
+from orchestrator.devices.sandbox.process_tree import descendants, started_by_fmu
+from orchestrator.devices.sandbox.protections_in_force import (
     ATTRIBUTES,
     NAMES,
     NETWORK,
@@ -36,8 +40,9 @@ from orchestrator.devices.fmi.protection import (
     WRITING,
     missing,
 )
+from orchestrator.devices.sandbox.resource_limits import Limits
 from tests.devices.acceptance.gallery.build import build
-from tests.devices.fmi.evil import evil
+from tests.devices.sandbox.evil import evil
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the sandbox is Linux's")
 
@@ -46,7 +51,7 @@ WITHOUT_NAMESPACES = tuple(layer for layer in LAYERS if layer != "namespaces")
 
 @pytest.fixture(params=[LAYERS, WITHOUT_NAMESPACES], ids=["all", "without namespaces"])
 def layers(request, monkeypatch):
-    monkeypatch.setattr(confined, "LAYERS", request.param)
+    monkeypatch.setattr(foreign_process, "LAYERS", request.param)
     return request.param
 
 
@@ -110,7 +115,7 @@ def test_the_machine_lists_what_protects_it_and_what_it_lacks(act, fmu, capsys):
 
 
 def test_what_is_left_out_is_named(act, fmu, monkeypatch):
-    monkeypatch.setattr(confined, "LAYERS", ())
+    monkeypatch.setattr(foreign_process, "LAYERS", ())
     *_, component = act(fmu("THREADS", value=1))
     assert {PROCESSES, NETWORK, WRITING, ATTRIBUTES, READING} == {
         protection.name for protection in component.protections if not protection.in_force
@@ -223,14 +228,14 @@ def test_limits_and_priority_of_others_stay(layers, act, fmu):
 
 @pytest.mark.parametrize("alone", [("seccomp",), ("landlock",)])
 def test_either_keeps_signals_inside_alone(alone, act, fmu, monkeypatch):
-    monkeypatch.setattr(confined, "LAYERS", alone)
+    monkeypatch.setattr(foreign_process, "LAYERS", alone)
     assert act(fmu("KILL", value=os.getpid()), needs=[PROCESSES])[:2] == (0, errno.EPERM)
     with pytest.raises(ComponentError, match="SIGABRT"):  # its own reach it
         act(fmu("ABORT"))
 
 
 def test_the_filter_of_calls_protects_attributes_alone(act, fmu, tmp_path, monkeypatch):
-    monkeypatch.setattr(confined, "LAYERS", ("seccomp",))
+    monkeypatch.setattr(foreign_process, "LAYERS", ("seccomp",))
     outside, kept = tmp_path / "outside", tmp_path / "kept"
     outside.write_text("mine")
     kept.hardlink_to(outside)
@@ -303,7 +308,7 @@ def test_memory_counts_for_all_its_processes_together(layers, act, fmu):
     "kept", [LAYERS, WITHOUT_NAMESPACES, ("namespaces",)], ids=["all", "two", "no filter"]
 )
 def test_memory_counts_where_a_process_hides_it(kept, act, fmu, monkeypatch):
-    monkeypatch.setattr(confined, "LAYERS", kept)
+    monkeypatch.setattr(foreign_process, "LAYERS", kept)
     with pytest.raises(
         ComponentError, match="memory: its processes used more than 400000000 bytes together"
     ):
@@ -470,11 +475,11 @@ def test_the_memory_cannot_be_shrunk_under_gfor(layers, act, fmu):
 
 _GFOR = """
 import sys
-from orchestrator.devices.fmi import confined
+from orchestrator.devices.sandbox import foreign_process
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.fmi.instance import open_component
 
-confined.LAYERS = tuple(sys.argv[2].split())
+foreign_process.LAYERS = tuple(sys.argv[2].split())
 component = open_component("evil", read_description(sys.argv[1]), isolated=True)
 component.setup(0.0, None)
 component.enter_initialization_mode()
@@ -530,12 +535,12 @@ def test_the_numbers_of_refused_calls_are_the_kernels(header, column):
     kernel = {name: int(number) for name, number in lines}
     ours = {
         name: numbers[column]
-        for group in seccomp._CALLS.values()
+        for group in system_call_filter._CALLS.values()
         for name, numbers in group.items()
     }
     names = ("_KILL", "_TGKILL", "_SOCKETPAIR", "_CLONE", "_CLONE3", "_PRCTL")
-    ours |= {name[1:].lower(): getattr(seccomp, name)[column] for name in names}
-    ours["seccomp"] = list(seccomp._SECCOMP.values())[column]
+    ours |= {name[1:].lower(): getattr(system_call_filter, name)[column] for name in names}
+    ours["seccomp"] = list(system_call_filter._SECCOMP.values())[column]
     known = ours.keys() & kernel.keys()
     assert {name: ours[name] for name in known} == {name: kernel[name] for name in known}
     assert len(known) > 70
@@ -548,4 +553,4 @@ def test_what_only_a_supervisor_limits_is_said_not_to_be_without_one(supervised)
         p.name: p.in_force
         for p in protections(Means(namespaces="refused", supervised=supervised), ())
     }
-    assert found[protection.TASKS] is (supervised and sys.platform == "linux")
+    assert found[protections_in_force.TASKS] is (supervised and sys.platform == "linux")

@@ -3,7 +3,7 @@
 import pytest
 
 from orchestrator.core.errors import ComponentError
-from orchestrator.devices.fmi.refusal import refuses_to_start
+from orchestrator.devices.fmi.refused_calls import refuses_to_start
 
 
 @pytest.mark.parametrize(

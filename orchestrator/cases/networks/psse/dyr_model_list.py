@@ -1,6 +1,6 @@
 """The list that `gfor new --list-models` prints: what each record becomes, by which source, and what is left out.
 
-The records themselves, with their fields: `records_of_units`, and beside each model."""
+The records themselves, with their fields: `dyr_unit_records`, and beside each model."""
 
 import tomllib
 from collections.abc import Iterator

@@ -15,16 +15,21 @@ from numpy.typing import NDArray
 
 from fmus.toolchain.removal import remove_tree
 from orchestrator.core.errors import ComponentError, ErrorKind, InputError, NotFiniteError
-from orchestrator.devices.fmi.answers import NotAnAnswerError, content_of, matrix, protections
+from orchestrator.core.interrupts import calls
 from orchestrator.devices.fmi.archive import extract
-from orchestrator.devices.fmi.confined import ConfinedProcess
 from orchestrator.devices.fmi.description import FmuDescription, runs_under_wine
-from orchestrator.devices.fmi.interrupts import calls
-from orchestrator.devices.fmi.limits import TO_BEGIN, Limits
-from orchestrator.devices.fmi.mailbox import DIED, HUNG, INTERRUPTED, NOT_A_NUMBER, TAMPERED
-from orchestrator.devices.fmi.protection import Protection
-from orchestrator.devices.fmi.refusal import refusal
+from orchestrator.devices.fmi.refused_calls import refusal
 from orchestrator.devices.fmi.remote_calls import Form, RemoteCalls
+from orchestrator.devices.sandbox.answer_forms import (
+    NotAnAnswerError,
+    content_of,
+    matrix,
+    protections,
+)
+from orchestrator.devices.sandbox.foreign_process import ConfinedProcess
+from orchestrator.devices.sandbox.mailbox import DIED, HUNG, INTERRUPTED, NOT_A_NUMBER, TAMPERED
+from orchestrator.devices.sandbox.protections_in_force import Protection
+from orchestrator.devices.sandbox.resource_limits import TO_BEGIN, Limits
 
 _TO_END = 5.0  # time for an FMU to free its instance [s]
 
@@ -64,7 +69,7 @@ class IsolatedComponent(RemoteCalls):
             "guid": self.description.guid,
             "directory": str(directory),
         }
-        worker = "orchestrator.devices.fmi.isolation_worker"
+        worker = "orchestrator.devices.fmi.isolated_component_worker"
         self._process = ConfinedProcess(
             worker,
             request,

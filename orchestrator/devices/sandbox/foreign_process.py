@@ -9,130 +9,18 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
 from fmus.toolchain.temporary import own_folder, remove
-from orchestrator.devices.fmi import wine
-from orchestrator.devices.fmi.confinement import LAYERS
-from orchestrator.devices.fmi.limits import TOO_MANY_TASKS, TOO_MUCH_DISK, TOO_MUCH_MEMORY, Limits
-from orchestrator.devices.fmi.mailbox import Mailbox, mailbox_library, shared_memory
-from orchestrator.devices.fmi.messages import FLOODED
-from orchestrator.devices.fmi.process_tree import MOST_FILES, running, started_by_fmu
-from orchestrator.devices.fmi.protection import Protection
-
-# on Windows, a process that dies of a fault ends with its status, at least this
-_WINDOWS_FAULTS = 0x80000000
-
-
-class ProcessFault(StrEnum):
-    CRASH = "crash"
-    EXIT = "exit"
-    HANG = "hang"
-    TAMPERING = "tampering"
-    OUTPUT = "output flood"
-    CPU = "processor time"
-    MEMORY = "memory"
-    TASKS = "too many processes"
-    LEFT = "process left behind"
-    DISK = "disk"
-
-
-def fault_of_exit(code: int, limits: Limits) -> tuple[ProcessFault, str]:
-    """Name of the fault that ended a process, and what happened.
-
-    ``code``: As `subprocess.Popen.wait` returns it: the negative number of a signal where one ended the process.
-
-    Examples
-    --------
-    A process that wrote to a null pointer gives ``("crash", "its process died with SIGSEGV")``.
-    """
-    if code == FLOODED:
-        return ProcessFault.OUTPUT, f"more than {limits.messages} log messages"
-    if code < 0 and -code == getattr(signal, "SIGXFSZ", None):
-        return ProcessFault.OUTPUT, f"more than {limits.output} bytes written"
-    if code < 0 and -code == getattr(signal, "SIGXCPU", None):
-        return ProcessFault.CPU, f"more than {limits.cpu:g} s in one process"
-    if code == TOO_MUCH_MEMORY:
-        return (
-            ProcessFault.MEMORY,
-            f"its processes used more than {limits.memory} bytes together, and were ended",
-        )
-    if code == TOO_MANY_TASKS:
-        return (
-            ProcessFault.TASKS,
-            f"more than {limits.tasks} processes and threads, which were ended",
-        )
-    if code == TOO_MUCH_DISK:
-        much = f"{limits.disk} bytes or {MOST_FILES} files and folders"
-        return (
-            ProcessFault.DISK,
-            f"its files came to more than {much}, or could not be counted; its processes were ended",
-        )
-    if code < 0:
-        return ProcessFault.CRASH, f"its process died with {_name_of_signal(-code)}"
-    if code >= _WINDOWS_FAULTS:
-        return ProcessFault.CRASH, f"its process died with code {code:#x}"
-    return ProcessFault.EXIT, f"it ended its process with exit code {code}"
-
-
-def _name_of_signal(number: int) -> str:
-    try:
-        return signal.Signals(number).name
-    except ValueError:  # most real-time signals have no name
-        return f"signal {number}"
-
-
-def last_line(output: Path) -> str:
-    """The last line of what a process wrote, 300 characters at most; empty where the file cannot be read."""
-    try:
-        with output.open("rb") as file:
-            file.seek(max(0, file.seek(0, 2) - 2000))
-            lines = file.read().decode("utf-8", "replace").strip().splitlines()
-    except OSError:
-        return ""
-    return " ".join(lines[-1:])[:300]
-
-
-_KEPT = (
-    "PATH",
-    "LANG",
-    "LANGUAGE",
-    "TZ",
-    "LD_LIBRARY_PATH",
-    "DYLD_LIBRARY_PATH",
-    "DYLD_FALLBACK_LIBRARY_PATH",
-    "SYSTEMROOT",
-    "WINDIR",
-    "COMSPEC",
-    "PATHEXT",
-    "NUMBER_OF_PROCESSORS",
-    "PROCESSOR_ARCHITECTURE",
-)
-_KEPT_BEGINNINGS = ("LC_", "OMP_", "OPENBLAS_", "MKL_", "KMP_", "PYTHON")
-_NOT_FOR_IT = ("PYTHONSTARTUP", "PYTHONINSPECT", "PYTHONBREAKPOINT")
-
-_FOR_THE_CACHE = ("HOME", "USERPROFILE", "XDG_CACHE_HOME", "LOCALAPPDATA", "GFOR_COSIM_CACHE")
-"""They say where compiled adapters lie; `apply_limits` takes them away before the FMU is loaded."""
-
-PASSED_ON = "GFOR_COSIM_FMU_ENVIRONMENT"
-"""Names, with commas between them, of further variables that FMUs need: where a licence is, for instance."""
-
-
-def environment(of: Mapping[str, str] | None = None) -> dict[str, str]:
-    """Keep part of an environment, by default of this process's own: a short list without keys or passwords."""
-    own = os.environ if of is None else of
-    more = [name.strip() for name in own.get(PASSED_ON, "").split(",")]
-    return {
-        name: value
-        for name, value in own.items()
-        if name in _KEPT
-        or name in _FOR_THE_CACHE
-        or name in more
-        or (name.startswith(_KEPT_BEGINNINGS) and name not in _NOT_FOR_IT)
-    }
-
+from orchestrator.devices.sandbox import wine
+from orchestrator.devices.sandbox.access_restriction import LAYERS
+from orchestrator.devices.sandbox.mailbox import Mailbox, mailbox_library, shared_memory
+from orchestrator.devices.sandbox.passed_environment import environment
+from orchestrator.devices.sandbox.process_end import ProcessFault, fault_of_exit, last_line
+from orchestrator.devices.sandbox.process_tree import running, started_by_fmu
+from orchestrator.devices.sandbox.protections_in_force import Protection
+from orchestrator.devices.sandbox.resource_limits import Limits
 
 # time in which a supervisor ends all that it watches over [s]; then it is ended itself
 _PATIENCE = 5.0
@@ -182,7 +70,7 @@ class ConfinedProcess:
                         sys.executable,
                         "-P",
                         "-m",
-                        "orchestrator.devices.fmi.supervisor",
+                        "orchestrator.devices.sandbox.supervisor",
                         json.dumps(told),
                     ],
                     stdin=subprocess.PIPE,
