@@ -164,7 +164,5 @@ def grid_of(mover: Mapping[str, Any], count: int) -> list[float]:
     sides = [np.linspace(end, value, count // 2 + 1) for end in (low, high)]
     if low > 0:
         sides = [np.geomspace(end, value, count // 2 + 1) for end in (low, high)]
-    return [float(f"{x:.4g}") for x in sides[0][:-1]] + [
-        value,
-        *sorted(float(f"{x:.4g}") for x in sides[1][:-1]),
-    ]
+    others = (float(f"{x:.4g}") for x in np.concatenate(sides) if x != value)
+    return sorted({value, *others})

@@ -24,6 +24,7 @@ from orchestrator.studies.sweep.axes import Axis, Vary, resolve
 
 _MOST = 400  # of the grid's points: the page holds all their modes
 _STEPS = 12  # values of a slider of the first screen, beside the case's own
+_HALVES = 5  # of the way to a slider's end that has no answer: its last value is within 3 % of it
 _BYTES = 2_500_000  # that the answers of such a page take, about
 
 
@@ -109,14 +110,6 @@ def _plan_of(
     own = _own_values(axes, known)
     grid = {axis.key: _with_own(axis.values, own.get(axis.key)) for axis in axes}
     points = [dict(zip(grid, chosen, strict=True)) for chosen in itertools.product(*grid.values())]
-    first: dict[str, Any] = {}
-    if varied:
-        first["first"] = _answered(desk, {**asked, "values": values, "ask": "first"})
-    else:
-        first, steps = _first_screen(desk, {**asked, "values": values})
-        own = {one["parameter"]: one["value"] for one in first["movers"]["movers"]}
-        grid = {one["parameter"]: grid_of(one, steps) for one in first["movers"]["movers"]}
-        points += [{key: x} for key, axis in grid.items() for x in axis if x != own[key]]
     setters = {axis.key: axis.sets for axis in axes}
 
     def computed(point: Mapping[str, float]) -> dict[str, Any]:
@@ -125,6 +118,15 @@ def _plan_of(
             given |= setters[key](x) if key in setters else {key: x}
         return desk.answer({**asked, "ask": "modes", "values": given}, _nobody)
 
+    first: dict[str, Any] = {}
+    if varied:
+        first["first"] = _answered(desk, {**asked, "values": values, "ask": "first"})
+    else:
+        first, steps = _first_screen(desk, {**asked, "values": values})
+        movers = first["movers"]["movers"]
+        own = {one["parameter"]: one["value"] for one in movers}
+        grid = {one["parameter"]: _reached_values(one, steps, computed) for one in movers}
+        points += [{key: x} for key, axis in grid.items() for x in axis if x != own[key]]
     listed = {one["parameter"] for one in parameters.get("parameters", ())}
     added = [_as_parameter(axis, grid[axis.key], own) for axis in axes if axis.key not in listed]
     kept = smaller_parameters(parameters, [*grid], scenarios)
@@ -250,6 +252,32 @@ def _answered(desk: Desk, question: Mapping[str, Any]) -> dict[str, Any]:
         return desk.answer(question, _nobody)
     except CosimError as error:
         return {"movers": [], "curves": {}, "reason": str(error)}
+
+
+def _reached_values(
+    mover: Mapping[str, Any], steps: int, computed: Callable[[Mapping[str, float]], dict[str, Any]]
+) -> list[float]:
+    """A slider's values, all of them in the range where the case has an answer: few beside it would hide a mode."""
+    key, value = str(mover["parameter"]), float(mover["value"])
+
+    def answered(x: float) -> bool:
+        try:
+            computed({key: x})
+        except CosimError:
+            return False
+        return True
+
+    def farthest(end: float) -> float:
+        if end == value or answered(end):
+            return end
+        good, bad = value, end
+        for _ in range(_HALVES):
+            middle = float(f"{(good + bad) / 2:.4g}")
+            good, bad = (middle, bad) if answered(middle) else (good, middle)
+        return good
+
+    axis = grid_of(mover, steps)
+    return grid_of({**mover, "minimum": farthest(axis[0]), "maximum": farthest(axis[-1])}, steps)
 
 
 def _with_own(axis: Sequence[float], own: float | None) -> list[float]:
