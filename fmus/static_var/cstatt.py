@@ -117,6 +117,8 @@ def _emf(m: ModelBuilder, port: DevicePort, size: Expr, held: HeldVoltage, X: Ex
     m.require(I_C - I_0 + MOST_POWER, f"{text} ICMAX: lower Q_0, or raise ICMAX")
     m.require(I_0 + I_L + MOST_POWER, f"{text} ILMAX: raise Q_0, or raise ILMAX")
     m.require(E_LIMIT - E_0 + MOST_POWER, f"{text} ELIMIT: lower Q_0, or raise ELIMIT")
+    text = "VMIN to VMAX, the limits of the regulator's error, do not hold the 0 of a steady state"
+    m.require(fmin(V_MAX, -V_MIN), f"{text}: raise VMAX above 0, or lower VMIN below it")
     reference = m.calculated(
         "Vref", held.start + droop * I_0, "pu", "Voltage reference", base="bus"
     )

@@ -235,6 +235,8 @@ def test_csvgn3_is_csvgn1_while_its_override_rests(frequency):
         ("cstatt", {"Q_0": 1.4}, "ICMAX: lower Q_0"),
         ("cstatt", {"Q_0": -1.4}, "ILMAX: raise Q_0"),
         ("cstatt", {"ELIMIT": 1.03}, "ELIMIT: lower Q_0"),
+        ("cstatt", {"VMAX": 1.2, "VMIN": 0.8}, "raise VMAX above 0, or lower VMIN below it"),
+        ("cstatt", {"VMAX": 0.0}, "raise VMAX above 0"),
         ("svsmo1", {"Q_0": 1.2}, "lower Q_0, or raise Bmax"),
         ("svsmo1", {"Q_0": -0.4}, "raise Q_0, or lower Bmin"),
     ],
