@@ -13,6 +13,9 @@ from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, given_value
 from orchestrator.cases.networks.psse.dyr_unit_records import RECORDS_OF_UNITS
 from orchestrator.core.errors import InputError
 
+_RATING = "S_n"
+"""Parameter with a unit's rating [MVA]; a controller of several plants may leave the base to the system."""
+
 _BUS = "BUSR"
 """Field of a converter's control that names a bus; 0 and the machine's own are its terminal."""
 
@@ -95,6 +98,12 @@ def values_of_record(record: DynamicRecord, known: DyrRecord) -> dict[str, float
             raise InputError.at(
                 record.place,
                 f"{record.name} has {field.name} = 0, which PSS/E replaces; give its value",
+            )
+        if _RATING in field.parameters and known.kind == "converter" and value <= 0:
+            raise InputError.at(
+                record.place,
+                f"{record.name} has {field.name} = {value:g}: the base of its values must exceed 0; "
+                "write its rating in MVA",
             )
         if field.zero_sets:
             found[field.zero_sets] = value == 0

@@ -107,6 +107,17 @@ def test_a_facts_devices_own_record_makes_it_a_static_condenser(gfor, folder, bu
     assert abs(prepared.power_flow.voltages["bus_8"]) == pytest.approx(wanted)
 
 
+@pytest.mark.parametrize("base", [0, -30])
+def test_a_facts_devices_record_without_a_base_is_refused(gfor, folder, base):
+    """All its values are on STBASE: none other may stand for it."""
+    (folder / "grid.dyr").write_text(MACHINES + CSTCNT.format(bus=0, base=base))
+    code, _, err = gfor("new", folder / "grid.raw", folder / "grid.dyr", "--out", folder / "x.toml")
+    assert code == 2
+    assert f"CSTCNT has STBASE = {base}: the base of its values must exceed 0" in " ".join(
+        err.split()
+    )
+
+
 def power_flow(gfor, case):
     code, out, err = gfor("modes", case, "--scenario", "base", "--json")
     assert code == 0, err
