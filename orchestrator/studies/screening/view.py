@@ -386,10 +386,12 @@ def _of_controls(summary: Summary) -> str:
 
 
 def _of_relays(summary: Summary) -> str:
-    """Tell that the runs of the outages can show no trips; "" where there are relays, or no runs."""
+    """Tell that no relay acts in the runs of the outages; "" where there are relays, or no runs.
+
+    Models may trip by themselves nevertheless: motors, DC lines, shares of DER_A."""
     if not summary.runs or summary.result.plan.prepared.relays:
         return ""
-    told = "no relay is in the case, so that nothing trips in the runs of the outages"
+    told = "the case has no relay of a unit or a load, so that in the runs of the outages none acts"
     return f"{told}; " + Option.PROTECTION + " prc029 lets converters trip by NERC's PRC-029"
 
 
