@@ -380,3 +380,28 @@ def test_uel2c_rests_above_its_polygon_and_integrates_below_it():
     assert found[-1]["v_s"] == pytest.approx(0.19, rel=0.05)
     found, _ = integrated(alone, lambda t: [E_FD, E_FD, 0.7, 0.1], 3.0, x=x)
     assert found[-1]["v_s"] == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("name", ["uel1", "uel2", "uel2c"])
+@pytest.mark.parametrize(("lead", "is_linear"), [(0.0, True), (0.05, True), (0.3, False)])
+def test_a_limiter_that_only_integrates_rests_where_a_linear_model_can_be_made(
+    name, lead, is_linear
+):
+    """Its integral holds all limits behind it, unless a lead of more than its lag falls below them."""
+    values = {"K_UL": 0.0, "K_UI": 0.5, "V_UIMIN": 0.0, "V_ULMIN": 0.0, "T_U1": lead, "T_U2": 0.1}
+    values |= {"V_UELMIN1": 0.0, "V_UELMIN2": 0.0} if name == "uel2c" else {}
+    alone = limiter(values, uel=UELS[name])
+    assert not refused(alone)
+    at = [E_FD, E_FD, 0.7, -0.1]
+    rest = alone.model.states
+    moved = [
+        alone.x + sign * 1e-5 * np.array(["integrator" in s.name for s in rest]) for sign in (1, -1)
+    ]
+    up, down = (alone.outputs(at, x)["v_s"] for x in moved)
+    assert up == pytest.approx(1e-5 * lead / 0.1)
+    assert down == pytest.approx(-up if is_linear else 0.0, abs=1e-12)
+    above, below = (alone.rates(at, x) for x in moved)
+    for state in above if is_linear else ():
+        assert above[state] == pytest.approx(-below[state], abs=1e-12)
+    lifted, _ = integrated(alone, lambda t: [E_FD, E_FD, 0.7, 3.0], 1.0)
+    assert lifted[-1]["v_s"] > 0.05

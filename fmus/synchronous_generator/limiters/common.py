@@ -7,6 +7,7 @@ exciter's signal instead, at a gate where the exciter's diagram has one."""
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from fmus.synchronous_generator.data_lines import Given
 from fmus.synchronous_generator.excitation.common import (
     BEFORE,
     BEHIND,
@@ -16,7 +17,12 @@ from fmus.synchronous_generator.excitation.common import (
 )
 from fmus.toolchain.blocks import RETURN_TIME
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else
+from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and, logic_or
+
+_OUT_OF_REACH = 1e3
+"""By which a lower limit is moved that nothing reaches [pu, S_n]."""
+
+_ONE = 0.5  # above which a condition of 0 or 1 holds
 
 LEAST = 1e-6
 """Signal [pu, S_n] from which a limiter acts: far below what moves a voltage, far above rounding."""
@@ -28,6 +34,22 @@ def rate_within_limits(x: Expr, rate: Scalar, low: Scalar, high: Scalar) -> Expr
     ``rate``: its rate without limits. A limit is approached no faster than with `RETURN_TIME`: where a limiter rests, a
     step off its limit and one beyond it return alike, so that a linear model can be made there."""
     return fmin(fmax(rate, (low - x) / RETURN_TIME), (high - x) / RETURN_TIME)
+
+
+@dataclass(frozen=True)
+class Floors:
+    """Lower limits behind the integral of a limiter that has no other way, K_UL = 0, and rests at its own limit.
+
+    What holds that integral keeps what follows it off these limits, unless a stage leads or one of them is above. Where
+    they are not reached they are moved away: at the corner of a limit no linear model can be made."""
+
+    integral: Scalar  # lower limit of the integral [pu, S_n]
+    is_sole: Expr  # 1 where nothing but the integral arrives and no stage leads, else 0
+
+    def of(self, limit: Scalar) -> Expr:
+        """Return a lower limit [pu, S_n]; one that is not reached where only the integral arrives above it."""
+        is_met = logic_or(self.is_sole < _ONE, limit > self.integral)
+        return if_else(is_met, limit, limit - _OUT_OF_REACH)
 
 
 @dataclass(frozen=True)
@@ -44,6 +66,15 @@ class Limited:
 
 
 Limiter = Callable[[ModelBuilder, Regulated], Limited]
+
+
+def floors_behind(p: Given) -> Floors:
+    """Return the lower limits behind K_UL + K_UI/s of a limiter of underexcitation with two leads and lags.
+
+    ``p``: its parameters, as IEEE 421.5 names them."""
+    follows = logic_and(p.T_U1 <= p.T_U2, p.T_U3 <= p.T_U4)
+    alone = logic_and(p.K_UL <= 0, p.K_UI > 0)
+    return Floors(p.V_UIMIN, if_else(logic_and(alone, follows), 1, 0))
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from itertools import pairwise
 
 from fmus.synchronous_generator.data_lines import Given, declared, number, power, seconds
 from fmus.synchronous_generator.excitation.common import Regulated
-from fmus.synchronous_generator.limiters.common import Limited, rate_within_limits
+from fmus.synchronous_generator.limiters.common import Limited, floors_behind, rate_within_limits
 from fmus.toolchain.blocks import BYPASS_TIME, clamp, lead_lag, low_pass_or_nothing
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
@@ -88,7 +88,8 @@ def uel2(m: ModelBuilder, seen: Regulated) -> Limited:
     controlled, controlled_0 = _controlled(m, p, least - Q, least_0 - at.S_0.im)
     first = lead_lag(m, "lead_lag_1", controlled, p.T_U1, p.T_U2, controlled_0)
     second = lead_lag(m, "lead_lag_2", first, p.T_U3, p.T_U4, controlled_0)
-    signal, at_start = (clamp(x, p.V_ULMIN, p.V_ULMAX) for x in (second, controlled_0))
+    lowest = floors_behind(p).of(p.V_ULMIN)
+    signal, at_start = (clamp(x, lowest, p.V_ULMAX) for x in (second, controlled_0))
     return Limited(signal, at_start, lambda E_fd: None, fmax(p.V_UIMIN, p.V_ULMIN))
 
 
@@ -105,14 +106,17 @@ def uel2c(m: ModelBuilder, seen: Regulated) -> Limited:
     adjusted = _gain(p, at.v, Expr(at.S.re), Expr(at.S.im))
     gain = low_pass_or_nothing(m, "gain", adjusted, p.T_adj, gain_0)
     controlled, controlled_0 = _controlled(m, p, (least - Q) / gain, (least_0 - at.S_0.im) / gain_0)
-    first_0 = clamp(controlled_0, p.V_UELMIN2, p.V_UELMAX2)
-    second_0 = clamp(first_0, p.V_UELMIN1, p.V_UELMAX1)
+    floors = floors_behind(p)
+    low_2, low_1 = floors.of(p.V_UELMIN2), floors.of(p.V_UELMIN1)
+    first_0 = clamp(controlled_0, low_2, p.V_UELMAX2)
+    second_0 = clamp(first_0, low_1, p.V_UELMAX1)
     staged = lead_lag(m, "lead_lag_1", controlled, p.T_U1, p.T_U2, controlled_0)
-    first = clamp(staged, p.V_UELMIN2, p.V_UELMAX2)
+    first = clamp(staged, low_2, p.V_UELMAX2)
     staged = lead_lag(m, "lead_lag_2", first, p.T_U3, p.T_U4, first_0)
-    second = clamp(staged, p.V_UELMIN1, p.V_UELMAX1)
+    second = clamp(staged, low_1, p.V_UELMAX1)
     lowest = fmax(fmax(p.V_UIMIN, p.V_UELMIN2), fmax(p.V_UELMIN1, p.V_ULMIN))
-    signal, at_start = (clamp(x, p.V_ULMIN, p.V_ULMAX) for x in (second, second_0))
+    low = floors.of(p.V_ULMIN)
+    signal, at_start = (clamp(x, low, p.V_ULMAX) for x in (second, second_0))
     return Limited(signal, at_start, lambda E_fd: None, lowest)
 
 
@@ -150,7 +154,8 @@ def _controlled(m: ModelBuilder, p: Given, excess: Expr, excess_0: Expr) -> tupl
     within = rate_within_limits(x, p.K_UI * excess, p.V_UIMIN, p.V_UIMAX)
     m.derivative(x, if_else(integrates, within, -x / BYPASS_TIME))
     now, start = (p.K_UL * e + integral for e, integral in ((excess, x), (excess_0, x_0)))
-    return clamp(now, p.V_UIMIN, p.V_UIMAX), clamp(start, p.V_UIMIN, p.V_UIMAX)
+    low = floors_behind(p).of(p.V_UIMIN)
+    return clamp(now, low, p.V_UIMAX), clamp(start, low, p.V_UIMAX)
 
 
 def _bias(p: Given, v: Expr) -> Expr:

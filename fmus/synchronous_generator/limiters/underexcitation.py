@@ -17,7 +17,7 @@ IEEE 421.5 and Dynawo's Uel1 at 289313a, whose integral stops while the sum is a
 
 from fmus.synchronous_generator.data_lines import declared, number, power, seconds
 from fmus.synchronous_generator.excitation.common import Regulated
-from fmus.synchronous_generator.limiters.common import Limited, rate_within_limits
+from fmus.synchronous_generator.limiters.common import Limited, floors_behind, rate_within_limits
 from fmus.toolchain.blocks import BYPASS_TIME, clamp, lead_lag
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
@@ -88,13 +88,15 @@ def uel1(m: ModelBuilder, seen: Regulated) -> Limited:
     within = rate_within_limits(x, p.K_UI * e, p.V_UIMIN, p.V_UIMAX)
     m.derivative(x, if_else(integrates, within, -x / BYPASS_TIME))
 
+    floors = floors_behind(p)
+
     def controlled(excess: Expr, integral: Expr) -> Expr:
-        return clamp(p.K_UL * excess + integral, p.V_UIMIN, p.V_UIMAX)
+        return clamp(p.K_UL * excess + integral, floors.of(p.V_UIMIN), p.V_UIMAX)
 
     first = controlled(excess(seen.v_0, seen.start.i), x_0)
     u = lead_lag(m, "lead_lag_1", controlled(e, x), p.T_U1, p.T_U2, first)
     u = lead_lag(m, "lead_lag_2", u, p.T_U3, p.T_U4, first)
-    signal = clamp(u, p.V_ULMIN, p.V_ULMAX)
-    at_start = clamp(first, p.V_ULMIN, p.V_ULMAX)
+    lowest = floors.of(p.V_ULMIN)
+    signal, at_start = clamp(u, lowest, p.V_ULMAX), clamp(first, lowest, p.V_ULMAX)
     least = fmax(p.V_UIMIN, p.V_ULMIN)
     return Limited(signal, at_start, lambda E_fd: None, least)
