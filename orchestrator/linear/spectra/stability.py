@@ -313,7 +313,9 @@ def judge(
     if own.stable is False:
         return replace(own, cause=_cause(own, rate), continuous_growth_rate=rate)
     if continuous.stable is False:
-        text = f"the communication step of {model.step_size:g} s hides it: the step map has no growing mode"
+        rate_of_map = own.largest_growth_rate
+        seen = "" if rate_of_map is None else f", at most {rate_of_map:+.2g} 1/s"
+        text = f"the communication step of {model.step_size:g} s hides it: nothing grows in the step map{seen}"
         return replace(
             continuous,
             continuous_growth_rate=rate,

@@ -480,7 +480,11 @@ def test_stability_is_lost_beyond_the_sliders_range_and_said_in_the_sweeps_words
         said = control.locator(".finder [role=status]").inner_text().split("\n")[0]
         holds, fails = map(
             float,
-            re.match(r"stable up to X_L (\S+), UNSTABLE at (\S+): a mode grows", said).groups(),
+            re.match(
+                r"stable up to X_L (\S+), UNSTABLE at (\S+): a mode grows at \+\S+ 1/s "
+                r"\(no oscillation, in sg\d[ \w]*\) set$",
+                said,
+            ).groups(),
         )
         desk = Desk("two_area", False)
         question = {"ask": "modes", "scenario": "gfor"}
@@ -501,6 +505,7 @@ def test_a_refused_outage_and_a_search_that_cannot_act_say_so(browser):
             "#failure", has_text="not computed; what is shown is the state before"
         ).wait_for()
         assert view.locator("#element input[type=checkbox]").is_checked()
+        assert view.evaluate("$('element').scrollWidth <= $('element').clientWidth")  # a long path
         assert view.locator("#controls .control").count() == 0
         assert view.evaluate("state.values") == {}
         assert view.locator("#verdict").inner_text() == before

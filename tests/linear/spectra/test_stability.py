@@ -155,7 +155,7 @@ def test_what_the_step_hides_is_said():
     verdict = judge(model(np.array(pair(1.0, -0.01)), STEP), system=model(np.array(pair(1.0, 0.3))))
     assert verdict.stable is False
     assert verdict.largest_growth_rate == pytest.approx(0.3)
-    assert "hides it" in verdict.sentence()
+    assert "hides it: nothing grows in the step map, at most -0.01 1/s" in verdict.sentence()
 
 
 def test_modes_outside_a_range_are_counted_and_real_poles_are_none():

@@ -129,6 +129,12 @@ function nearBy(name, percent) {
   const x = one ? one.value + (percent - seen.movers.damping_percent) * one.step / one.points : NaN;
   return Number.isFinite(x) && x >= (one.minimum ?? -Infinity) && x <= (one.maximum ?? Infinity) && x * one.value > 0 ? x : null;
 }
+// What grows, in a few words: how fast, at which frequency, and in which components.
+function growthOf({ largest_growth_rate: rate, frequency_hz: hertz, participation, sentence }) {
+  if (rate === null || !participation.length) return sentence;
+  const where = [...new Set(participation.slice(0, 3).map(one => one.state.split(".")[0]))].join(" and ");
+  return `a mode grows at ${signed(rate, 2)} 1/s (${hertz ? `${number(hertz, 3)} Hz` : "no oscillation"}, in ${where})`;
+}
 function finder({ now, bounds, valuesAt, apply, words }) {
   const names = Object.keys(valuesAt(1)), wanted = make("input", { value: 5, size: 3, inputmode: "decimal", "aria-label": `damping in % that ${words} is looked for` }), said = make("span", { class: "soft block", role: "status" }), begin = make("button", {}, "find"), until = make("button", { title: "the whole spectrum, aperiodic growth too" }, "until unstable");
   const say = text => { said.textContent = text; };
@@ -148,7 +154,7 @@ function finder({ now, bounds, valuesAt, apply, words }) {
       else if (found) {
         const idle = Object.keys(valuesAt(x)).map(name => found.idle[name] && `${name} cannot act: ${found.idle[name]}`).filter(Boolean);
         if (idle.length) { stopped = idle.join("; "); return null; }
-        const point = { x, verdict: found.verdict, ...holds(found.modes.scenarios[0]) };
+        const point = { x, stability: found.modes.scenarios[0].stability, ...holds(found.modes.scenarios[0]) };
         if (point.f !== null) { tried.push(point); return point; }
         error.textContent = `the verdict is not known: ${found.verdict}`;
       }
@@ -158,7 +164,7 @@ function finder({ now, bounds, valuesAt, apply, words }) {
     if (byDerivative !== null) tell(`about ${number(byDerivative, 3)} by ∂λ/∂p at ${number(here)} (≈); being computed …`);
     const first = await at(here), edges = [], crossings = [];
     if (!first) { say(stopped || error.textContent); return; }
-    const text = ({ good, bad }) => (percent === null ? `stable ${bad.x > good.x ? "up" : "down"} to ${words} ${number(good.x, 6)}, UNSTABLE at ${number(bad.x, 6)}${bad.verdict.includes("cause: the coupling") ? ", by the communication step and not by the system" : ""}: ${bad.verdict.replace(/^UNSTABLE: /, "")}`
+    const text = ({ good, bad }) => (percent === null ? `stable ${bad.x > good.x ? "up" : "down"} to ${words} ${number(good.x, 6)}, UNSTABLE at ${number(bad.x, 6)}${bad.stability.cause === "coupling" ? ", by the communication step and not by the system" : ""}: ${growthOf(bad.stability)}`
       : `${fixed(good.damping, 2)} % at ${words} ${number(good.x, 6)}; ${bad.x > good.x ? "above" : "below"} it is less than ${number(percent)} %${bad.f < -percent ? " (unstable)" : ""}`);
     // Between two points of which one holds: to 0.00 %, or to 2e-4 of the value; by secants, every third time by halves.
     const crossingIn = async (a, b) => {
