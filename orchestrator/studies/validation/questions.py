@@ -14,6 +14,7 @@ class QuestionKind(StrEnum):
     RATED_FREQUENCY = "rated frequency"
     ANGLE_UNIT = "angle unit"
     ANGLE_HELD = "angle held"
+    POWER_HELD = "power held"
     ANGLE_AND_FREQUENCY = "angle and frequency differ"
     FREQUENCY_ALONE = "frequency alone"
     PHASE_ORDER = "phase order"

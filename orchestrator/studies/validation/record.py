@@ -23,6 +23,7 @@ from orchestrator.studies.validation.averaging import averaged
 from orchestrator.studies.validation.channels import RecordedChannel, channels_in, in_base, unit_of
 from orchestrator.studies.validation.clipped import clipped_run
 from orchestrator.studies.validation.filled import Mask, filled_samples, runs_of
+from orchestrator.studies.validation.held_power import held_power
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.transformer import AT_PORT, Between, Beyond
 
@@ -258,6 +259,10 @@ class _Reading:
                 self.ask(QuestionKind.STUCK, value=float(self.dataset[column][known][0]), **figures)
             if role == "v" and _scatters(value):
                 self._ask_of_still_angle()
+            held = held_power(times, value) if role in ("p", "q") else None
+            if held is not None:
+                figures = {"role": role, "column": column, "count": held.count}
+                self.ask(QuestionKind.POWER_HELD, usual=held.usual, longest=held.longest, **figures)
             run = clipped_run(value) if role in ("p", "q") else None
             if run is not None:
                 low, high = run

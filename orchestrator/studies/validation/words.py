@@ -209,6 +209,15 @@ def _stuck(x: Figures) -> str:
     )
 
 
+def _power_held(x: Figures) -> str:
+    return (
+        f"{x['column']!r} stands still to the last digit {x['count']} times while it moves, for {x['usual']:.3g} s and "
+        f"up to {x['longest']:.3g} s, and jumps in between: is it stored only every so often, or only where it has "
+        f"changed by enough? The errors count that as the model's. Give the measured samples, as in --channel "
+        f"'{x['role']}=COLUMN'"
+    )
+
+
 def _spike(x: Figures) -> str:
     return (
         f"{x['column']!r} leaves both samples beside it by {x['jump']:.3g} pu at {x['at']:g} s: is that a fault of the "
@@ -319,7 +328,7 @@ def _too_good(x: Figures) -> str:
 def _no_noise(x: Figures) -> str:
     return (
         f"before the event P and Q scatter by {x['scatter']:.1g} pu, which is less than an instrument's noise: the "
-        "recording is a simulation"
+        "recording is a simulation, or holds what changes little"
     )
 
 
@@ -359,6 +368,7 @@ _SENTENCES: Mapping[QuestionKind, Callable[[Figures], str]] = {
     QuestionKind.LOST_JUMP: _lost_jump,
     QuestionKind.START: _start,
     QuestionKind.READ_OTHERWISE: _read_otherwise,
+    QuestionKind.POWER_HELD: _power_held,
     QuestionKind.STUCK: _stuck,
     QuestionKind.SPIKE: _spike,
     QuestionKind.CLIPPED: _clipped,

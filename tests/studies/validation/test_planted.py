@@ -35,6 +35,10 @@ def held(frame, samples=10):
     return frame.assign(angle_deg=frame.angle_deg.to_numpy()[first])
 
 
+def held_power(frame, samples=100):
+    return frame.assign(p_mw=frame.p_mw.to_numpy()[np.arange(len(frame)) // samples * samples])
+
+
 def of_filtered_frequency(frame, seconds=0.1):
     """The angle as the integral of a frequency behind a first-order lag."""
     turns = 2 * np.pi * np.diff(frame.angle_deg / 360, prepend=frame.angle_deg[0] / 360) / 1e-3
@@ -161,6 +165,7 @@ PLANTED = {
         "spike",
     ),
     "held": (held, "angle held"),
+    "P is stored every 0.1 s": (held_power, "power held"),
     "the frequency turns the other way": (
         lambda f: of_frequency(f, -1),
         "angle and frequency differ",
