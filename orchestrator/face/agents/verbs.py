@@ -1,5 +1,6 @@
 """The eight verbs: each asks one command, and gives of its JSON what an agent needs."""
 
+import math
 import os
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -45,6 +46,9 @@ MOST_ROWS = 20
 
 MOST_DECIDING = 3
 """Growing modes that an explanation names, the least damped first."""
+
+LIKE = 1e-6
+"""Part of a growth rate within which two are that of one mode: JSON has all digits of both."""
 
 MOST_FILES = 200
 """Case files that `cases` lists."""
@@ -184,7 +188,7 @@ class Verbs:
         found = self._ask("modes", case, scenario, values)
         (one,) = found["scenarios"]
         stability = one["stability"]
-        because = [stability["reason"], *map(_sentence, _deciding(one))]
+        because = [_growth_elsewhere(one), stability["reason"], *map(_sentence, _deciding(one))]
         return ExplanationAnswer(
             scenario=one["name"],
             stable=one["stable"],
@@ -343,12 +347,29 @@ def _strength(row: Mapping[str, Any]) -> float:
 def _deciding(one: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Return the listed modes that decide a scenario's verdict: those that grow, or else the least damped one.
 
-    There is none where the verdict is not known, or rests on growth outside of the listed frequencies, which its
-    sentence tells."""
+    There is none where the verdict is not known, or rests on growth outside of the listed frequencies alone."""
     ordered = sorted(one["modes"], key=lambda mode: float(mode["damping_percent"]))
     if one["stable"] is False:
         return [mode for mode in ordered if mode["real"] > 0][:MOST_DECIDING]
     return ordered[:1] if one["stable"] else []
+
+
+def _growth_elsewhere(one: Mapping[str, Any]) -> str:
+    """Tell of the mode that grows fastest, if it is not among those listed; else ""."""
+    found = one["stability"]
+    fastest = found["largest_growth_rate"]
+    listed = (mode["real"] for mode in one["modes"])
+    if one["stable"] is not False or fastest is None:
+        return ""
+    if any(math.isclose(real, fastest, rel_tol=LIKE) for real in listed):
+        return ""
+    hertz = found["frequency_hz"]
+    at = f"at {hertz:.4g} Hz" if hertz else "without an oscillation"
+    states = ", ".join(f"{row['state']} {row['factor']:.2f}" for row in found["participation"][:4])
+    return (
+        f"the mode that grows fastest is outside of the listed frequencies: {fastest:+.3g} 1/s {at}; "
+        f"in it take part {states}"
+    )
 
 
 def _sentence(mode: Mapping[str, Any]) -> str:

@@ -8,7 +8,7 @@ import pytest
 
 import orchestrator as gfor
 from orchestrator.face.agents.question import Allowance, NoAnswerError, ask
-from orchestrator.face.agents.verbs import Verbs, _deciding
+from orchestrator.face.agents.verbs import Verbs, _deciding, _growth_elsewhere
 
 WITHIN = """
 import json, os, sys
@@ -171,6 +171,27 @@ def test_a_stable_scenario_is_explained_by_its_least_damped_mode(tmp_path):
     )
     (why,) = told.because
     assert f"the mode of {least.frequency_hz:.3f} Hz" in why
+
+
+def test_growth_outside_of_the_listed_frequencies_is_explained(tmp_path):
+    """Something of WSCC's base case grows without an oscillation, and both swings decay."""
+    told = Verbs(allowance(tmp_path)).explain("wscc9", "base")
+    assert told.stable is False
+    own = gfor.load("wscc9").scenario("base").modes().stability
+    (why,) = [text for text in told.because if "grows fastest" in text]
+    assert f"{own.largest_growth_rate:+.3g} 1/s without an oscillation" in why
+    assert own.mode.participation[0][0] in why
+    assert not [text for text in told.because if "the mode of" in text]
+
+
+def test_growth_is_not_told_twice():
+    swing = {"real": 0.1}
+    stability = {"largest_growth_rate": 0.1, "frequency_hz": 0.6, "participation": []}
+    told = {"modes": [swing], "stable": False, "stability": stability}
+    assert _growth_elsewhere(told) == ""
+    faster = stability | {"largest_growth_rate": 0.2, "frequency_hz": 3.0}
+    assert "+0.2 1/s at 3 Hz" in _growth_elsewhere(told | {"stability": faster})
+    assert _growth_elsewhere(told | {"stability": faster, "stable": None}) == ""
 
 
 def test_what_grows_elsewhere_is_not_explained_by_a_damped_swing():
