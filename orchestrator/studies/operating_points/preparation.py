@@ -184,6 +184,14 @@ class ItemPreparation:
             str(question) for question in prepared.questions if str(question) not in self._asked
         )
 
+    def warnings_of_rating(
+        self, prepared: PreparedScenario, units: Collection[str]
+    ) -> tuple[str, ...]:
+        """Those of the warnings that ask whether the rating of one of these units is meant."""
+        rated = {f"{name}.S_n" for name in units}
+        asked = {str(q) for q in prepared.questions if q.topic and rated & set(q.topic.variables)}
+        return tuple(text for text in self.warnings(prepared) if text in asked)
+
     def overloads(self, prepared: PreparedScenario) -> dict[str, float]:
         """Units beyond their rating [pu of it], and further than without the item's values."""
         meant = self._case.table.meant

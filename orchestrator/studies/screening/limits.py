@@ -6,8 +6,9 @@ from typing import Any
 from orchestrator.cases.networks.branch_limits import Loading
 from orchestrator.core.errors import number_of
 from orchestrator.output.report.column_table import Column, ColumnTable
+from orchestrator.studies.operating_points.words import counted_items
 from orchestrator.studies.screening.study import ScreenedItem
-from orchestrator.studies.screening.summary import Summary
+from orchestrator.studies.screening.summary import Summary, where
 
 _FEW = 3
 
@@ -124,11 +125,11 @@ def _branches_in_words(summary: Summary) -> str:
     if not rated:
         return ""
     worst, item = max(rated, key=lambda entry: entry[0].part)
-    most = f"{worst.branch} with {100 * worst.part:.4g} % ({_where(item)})"
+    most = f"{worst.branch} with {100 * worst.part:.4g} % ({where(summary, item)})"
     over, total = sum(one.beyond for one, _ in rated), len(rated)
     if not over:
         return f"No branch is beyond its rating{_without_flow(summary)}; {most} is loaded most."
-    text = f"At {over} of {total} items a branch is beyond its rating, most {most}."
+    text = f"At {counted_items(over, total)} a branch is beyond its rating, most {most}."
     already = sorted({name for names in _beyond_intact(summary).values() for name in names})
     if already:
         shown = ", ".join(already[:_FEW]) + f" and {len(already) - _FEW} more" * (
@@ -148,8 +149,8 @@ def _voltages_in_words(summary: Summary) -> str:
     known = sum(x.record.has_flow for x in summary.result.items)
     side = "below" if worst.voltage < worst.limit else "above"
     return (
-        f"At {len(found)} of {known} items a bus voltage is outside of its band, furthest "
-        f"{worst.bus} with {worst.voltage:.4f} pu, {side} {worst.limit:g} pu ({_where(item)})."
+        f"At {counted_items(len(found), known)} a bus voltage is outside of its band, furthest "
+        f"{worst.bus} with {worst.voltage:.4f} pu, {side} {worst.limit:g} pu ({where(summary, item)})."
     )
 
 
@@ -193,7 +194,3 @@ def _bus(item: ScreenedItem) -> str | None:
 
 def _voltage(item: ScreenedItem) -> float | None:
     return item.record.outliers[0].voltage if item.record.outliers else None
-
-
-def _where(item: ScreenedItem) -> str:
-    return f"{item.point.name}, {item.outage.name}"

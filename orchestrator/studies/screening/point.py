@@ -234,6 +234,7 @@ class _Worker:
                 found.record,
                 text=prepared.text,
                 beyond=beyond,
+                of_rating=self._preparation.warnings_of_rating(prepared.scenario, beyond),
                 reactive=fed,
                 loadings=loaded,
                 outliers=outside,

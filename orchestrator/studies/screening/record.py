@@ -62,6 +62,8 @@ class ItemRecord:
     text: str = ""
     warnings: tuple[str, ...] = ()
     beyond: dict[str, float] = field(default_factory=dict)  # units beyond their rating [pu of it]
+    # those of the warnings that ask about these ratings
+    of_rating: tuple[str, ...] = ()
     reactive: str = ""  # the bus whose units are furthest beyond their limits of reactive power
     # of the file's ratings and bands: the branch that is loaded most and all beyond their rating, buses outside of
     # their band; the worst first

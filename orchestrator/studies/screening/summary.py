@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.core.errors import few
 from orchestrator.linear.spectra.modes import damping_percent
 from orchestrator.studies.operating_points.item import Status
 from orchestrator.studies.screening.study import ScreenedItem, ScreeningResult
@@ -16,6 +17,7 @@ _ALIKE = 0.8  # likeness of shares above which two modes are one
 _FREQUENCY = 0.15  # part of the frequency within which they are
 
 _SHOWN = 5
+_FEW = 4  # units beyond their rating that are named beside the worst
 
 
 @dataclass(frozen=True)
@@ -94,10 +96,7 @@ class Summary:
         total = f"{len(judged)}{'' if len(judged) == len(self.result.items) else ' judged'}"
         fed = [one for item in judged if (one := item.record.reactive)]
         worst = [
-            max(
-                (load, name, item.point.name, item.outage.name)
-                for name, load in item.record.beyond.items()
-            )
+            max((load, name, where(self, item)) for name, load in item.record.beyond.items())
             for item in judged
             if item.record.beyond
         ]
@@ -107,8 +106,10 @@ class Summary:
             else []
         )
         if worst:
-            load, unit, *at = max(worst)
-            most = f"most {unit} with {100 * load:.3g} % ({', '.join(at)})"
+            load, unit, at = max(worst)
+            most = f"most {unit} with {100 * load:.3g} % ({at})"
+            others = sorted({name for one in judged for name in one.record.beyond} - {unit})
+            most += f", also {few(others, _FEW)}" if others else ""
             told.insert(0, f"at {len(worst)} of {total} a unit is beyond its rating, {most}")
         return "; ".join(told)
 
@@ -157,6 +158,12 @@ class Summary:
             who = ", ".join(name for name, _ in worst.participation(_LEADING))
             modes.append(ScreenedMode(f"{worst.frequency:.2f} Hz ({who})", worst, tuple(at)))
         return sorted(modes, key=lambda mode: mode.worst.damping)
+
+
+def where(summary: Summary, item: ScreenedItem) -> str:
+    """An item's point and outage; the outage alone where there is one point only."""
+    names = (item.point.name, item.outage.name)
+    return ", ".join(names if len(summary.result.plan.points) > 1 else names[1:])
 
 
 def _joined(groups: list[list[ModeAt]], items: Sequence[ScreenedItem]) -> list[list[ModeAt]]:

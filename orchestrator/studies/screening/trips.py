@@ -6,7 +6,7 @@ from orchestrator.core.errors import few
 from orchestrator.output.report.column_table import Column, ColumnTable
 from orchestrator.studies.screening.record import OutageRun
 from orchestrator.studies.screening.study import ScreenedItem
-from orchestrator.studies.screening.summary import Summary
+from orchestrator.studies.screening.summary import Summary, where
 
 _NAMED = 3  # trips of a run that a sentence or a cell names; the others are counted
 
@@ -42,7 +42,7 @@ def runs_sentence(summary: Summary) -> str:
         if items:
             first = items[0]
             assert first.record.run is not None
-            at = f"{first.point.name}, {first.outage.name}"
+            at = where(summary, first)
             told.append(f"in {len(items)} of {total} {what}, first {at}: {of(first.record.run)}")
     return f"runs of the outages: {'; '.join(told) or f'in none of {total} anything trips'}"
 

@@ -43,15 +43,22 @@ from orchestrator.studies.screening.limits import (
     limits_table,
 )
 from orchestrator.studies.screening.study import ScreenedItem, ScreeningResult
-from orchestrator.studies.screening.summary import ModeAt, ScreenedMode, Summary, duration, least_of
+from orchestrator.studies.screening.summary import (
+    ModeAt,
+    ScreenedMode,
+    Summary,
+    duration,
+    least_of,
+    where,
+)
 from orchestrator.studies.screening.trips import run_columns, runs_json, runs_table
 from orchestrator.studies.screening.words import (
     OutageRow,
     by_outage,
+    growth_in_short,
     verdict_of,
     verdict_sentence,
     what_was_counted,
-    where,
 )
 
 # names of the files in a folder of results
@@ -258,7 +265,8 @@ def overview(summary: Summary, most: int = 12) -> ColumnTable[OutageRow]:
     """Outages and points: the least damping of each, by points where these are few, else at the worst one."""
     plan, rows = summary.result.plan, by_outage(summary)
     at = {(item.outage.name, item.point.name): item for item in summary.result.items}
-    title = f"Least damping [%] below {100 * plan.wanted.damping:g} %, worst outage first"
+    title = "Least damping [%], worst outage first"
+    above = f"> {100 * plan.wanted.damping:g}"
     columns = [Column[OutageRow]("Outage", lambda row: row.name)]
     prepared = plan.prepared
     out = {one.name: tuple(map(line_of, one.elements)) for one in plan.outages}
@@ -266,8 +274,11 @@ def overview(summary: Summary, most: int = 12) -> ColumnTable[OutageRow]:
         columns.append(Column("Area", lambda row: prepared.area_of(*out.get(row.name, ()))))
     texts = len(columns)
 
+    def cell(item: ScreenedItem | None) -> str | Marked:
+        return _cell(item, above)
+
     def at_point(name: str) -> Column[OutageRow]:
-        return Column(name, lambda row: at.get((row.name, name)), _cell)
+        return Column(name, lambda row: at.get((row.name, name)), cell)
 
     if 1 < len(plan.points) <= _FEW:
         return ColumnTable(
@@ -278,15 +289,29 @@ def overview(summary: Summary, most: int = 12) -> ColumnTable[OutageRow]:
             most,
             ITEMS,
         )
+    if len(plan.points) > 1:
+        columns.append(Column("Worst point", lambda row: (row.worst or row.unjudged[0]).point.name))
     columns += [
-        Column("Worst point", lambda row: (row.worst or row.unjudged[0]).point.name),
         Column("Mode", lambda row: row.least, _who),
-        Column("Damping [%]", lambda row: row.worst, _cell),
-        Column(
-            "Not judged", lambda row: f"{len(row.unjudged)} of {row.points}" if row.unjudged else ""
-        ),
+        Column("Damping [%]", lambda row: row.worst, cell),
     ]
-    return ColumnTable(title, columns, rows, texts + 2, most, ITEMS)
+    if any(row.worst and growth_in_short(row.worst.record) for row in rows):
+        columns.append(Column("What grows besides", _grows_besides, text=True))
+    if any(row.unjudged for row in rows):
+        columns.append(Column("Not judged", _unjudged))
+    return ColumnTable(title, columns, rows, _place_of(columns, "Damping [%]"), most, ITEMS)
+
+
+def _place_of(columns: Sequence[Column[OutageRow]], heading: str) -> int:
+    return [column.heading for column in columns].index(heading)
+
+
+def _grows_besides(row: OutageRow) -> str:
+    return growth_in_short(row.worst.record) if row.worst else ""
+
+
+def _unjudged(row: OutageRow) -> str:
+    return f"{len(row.unjudged)} of {row.points}" if row.unjudged else ""
 
 
 def _who(mode: ModeAt | None) -> str:
@@ -295,14 +320,14 @@ def _who(mode: ModeAt | None) -> str:
     return f"{mode.frequency:.2f} Hz ({', '.join(name for name, _ in mode.participation(2))})"
 
 
-def _cell(item: ScreenedItem | None) -> str | Marked:
-    """The least damping at an item, or what became of it."""
+def _cell(item: ScreenedItem | None, above: str) -> str | Marked:
+    """The least damping at an item, or what became of it; ``above`` where it has no critical mode."""
     if item is None or item.record.status is not Status.COMPUTED:
         return "–" if item is None else str(item.record.status)
     least = least_of(item)
     if item.record.stable is False:
         return Marked(f"{least.damping:.2f} UNSTABLE" if least else "UNSTABLE", "bad")
-    return "more" if least is None else damping(least.damping)
+    return above if least is None else damping(least.damping)
 
 
 def no_modes(summary: Summary) -> str:
@@ -330,28 +355,32 @@ def modes_table(
         : int(whole)
     ]
 
-    def best(mode: ScreenedMode) -> tuple[str, float | None]:
-        return next(((n, max(abs(p), abs(q))) for n, p, q in mode.worst.ranking(1)), ("–", None))
+    plan, total = summary.result.plan, len(summary.result.items)
+    point = "Point" if len(plan.points) > 1 else ""
+    columns: list[Column[ScreenedMode]] = [
+        Column("Mode", lambda mode: mode.name, name="mode"),
+        Column(point, lambda mode: mode.worst.item.point.name, name="point"),
+        Column("Outage", lambda mode: mode.worst.item.outage.name, name="outage"),
+        *takes_part,
+        Column("", lambda mode: mode.worst.frequency, name="frequency_hz"),
+        Column("Damping [%]", lambda mode: mode.worst.damping, damping, "damping_percent"),
+        Column("Seen at", lambda mode: len(mode.at), lambda n: f"{n} of {total}", "items"),
+        *value,
+    ]
+    if any(mode.worst.ranking(1) for mode in summary.modes):
+        best_at = "Damping controller best at"
+        columns += [
+            Column(best_at, lambda mode: _best_controller(mode)[0], text=True),
+            Column("Shift by gain 1 pu [rad/s]", lambda mode: _best_controller(mode)[1], ".3g"),
+        ]
+    left = 2 + bool(point) + len(takes_part)
+    title = "Modes, each where it is damped least"
+    return ColumnTable(title, columns, summary.modes, left, most, MODES)
 
-    return ColumnTable(
-        "Modes, each where it is damped least",
-        (
-            Column("Mode", lambda mode: mode.name, name="mode"),
-            Column("Point", lambda mode: mode.worst.item.point.name, name="point"),
-            Column("Outage", lambda mode: mode.worst.item.outage.name, name="outage"),
-            *takes_part,
-            Column("", lambda mode: mode.worst.frequency, name="frequency_hz"),
-            Column("Damping [%]", lambda mode: mode.worst.damping, damping, "damping_percent"),
-            Column("Items", lambda mode: len(mode.at), name="items"),
-            *value,
-            Column("Converter", lambda mode: best(mode)[0]),
-            Column("by gain [rad/s]", lambda mode: best(mode)[1], ".3g"),
-        ),
-        summary.modes,
-        3 + len(takes_part),
-        most,
-        MODES,
-    )
+
+def _best_controller(mode: ScreenedMode) -> tuple[str, float | None]:
+    """The converter whose damping controller moves a mode most, and how far by unit gain [rad/s]."""
+    return next(((n, max(abs(p), abs(q))) for n, p, q in mode.worst.ranking(1)), ("–", None))
 
 
 def _cause(summary: Summary, item: ScreenedItem) -> str:
@@ -364,14 +393,14 @@ def _cause(summary: Summary, item: ScreenedItem) -> str:
     return text
 
 
-def _places(items: Sequence[ScreenedItem]) -> str:
+def _places(summary: Summary, items: Sequence[ScreenedItem]) -> str:
     """The items of one cause: the first in full, the outages and the points of all."""
     if len(items) == 1:
-        return where(items[0])
+        return where(summary, items[0])
     outages = list(dict.fromkeys(item.outage.name for item in items))
     points = list(dict.fromkeys(item.point.name for item in items))
     at = f" at {few(points, _FEW)}" if len(points) > 1 else ""
-    return f"{len(items)} items ({few(outages, _NAMED)}{at}), first {where(items[0])}"
+    return f"{len(items)} items ({few(outages, _NAMED)}{at}), first {where(summary, items[0])}"
 
 
 def _of_controls(summary: Summary) -> str:
@@ -403,15 +432,21 @@ def remarks(summary: Summary) -> list[str]:
         named = [item for item in summary.failures() if item.record.status is status]
         texts.append(f"{status}: {number} of {len(summary.result.items)}:")
         causes = kinds_of((item, [_cause(summary, item)]) for item in named)
-        texts += [f"  {_places(items)}: {text}" for text, items in causes]
+        texts += [f"  {_places(summary, items)}: {text}" for text, items in causes]
     every = summary.result.items
-    kinds = kinds_of((item, item.record.warnings) for item in every)
+    kinds = kinds_of((item, _not_said_yet(item)) for item in every)
     texts += [
-        f"at {len(x)} of {len(every)}, first at {where(x[0])}: {text}" for text, x in kinds[:_SHOWN]
+        f"at {len(x)} of {len(every)}, first at {where(summary, x[0])}: {text}"
+        for text, x in kinds[:_SHOWN]
     ]
     if len(kinds) > _SHOWN:
         texts.append(f"… and {len(kinds) - _SHOWN} more warnings, in items.csv")
     return texts
+
+
+def _not_said_yet(item: ScreenedItem) -> list[str]:
+    """An item's warnings but those about ratings, which the verdict counts."""
+    return [text for text in item.record.warnings if text not in item.record.of_rating]
 
 
 def as_json(summary: Summary) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from orchestrator.studies.operating_points.words import ONE_ITEM, all_items, cou
 from orchestrator.studies.screening.modes import UNSTABLE
 from orchestrator.studies.screening.record import ItemRecord
 from orchestrator.studies.screening.study import ScreenedItem, ScreeningPlan
-from orchestrator.studies.screening.summary import ModeAt, Summary, least_of
+from orchestrator.studies.screening.summary import ModeAt, Summary, least_of, where
 from orchestrator.studies.screening.trips import runs_sentence
 
 
@@ -168,7 +168,7 @@ def verdict_of(summary: Summary) -> VerdictSentence:
         worst = next(growing, summary.unstable[0])
         told = (not_judged(summary), runs_sentence(summary), summary.beyond)
         lost = "".join(f"; {text}" for text in told if text)
-        at = f"at {counted_items(len(summary.unstable), total, planned)}; worst: {where(worst)}"
+        at = f"at {counted_items(len(summary.unstable), total, planned)}; worst: {where(summary, worst)}"
         text = f"{at}{_least(worst)}{lost}"
         return VerdictSentence(False, "UNSTABLE", text)
     if summary.gone_wrong:
@@ -179,11 +179,13 @@ def verdict_of(summary: Summary) -> VerdictSentence:
         return VerdictSentence(False, "UNSTABLE", f"{text}{lost}")
     computed = summary.counts[Status.COMPUTED]
     least = summary.least_damped()[:1]
-    tail = f"; least damped: {where(least[0].item)}{_least(least[0].item)}" if least else ""
+    tail = (
+        f"; least damped: {where(summary, least[0].item)}{_least(least[0].item)}" if least else ""
+    )
     if summary.free:
         first = summary.free[0]
         zeros = zeros_in_words(first.record.zeros)
-        tail += f"; at {len(summary.free)} of them, first at {where(first)}, {zeros}"
+        tail += f"; at {len(summary.free)} of them, first at {where(summary, first)}, {zeros}"
     ran = runs_sentence(summary)
     tail += "".join(f"; {text}" for text in (ran, summary.beyond) if text)
     if summary.stable:
@@ -273,10 +275,6 @@ def _but_slowly(summary: Summary) -> str:
     )
 
 
-def where(item: ScreenedItem) -> str:
-    return f"{item.point.name}, {item.outage.name}"
-
-
 def _least(item: ScreenedItem) -> str:
     outside = growth_outside(item.record)
     if outside:
@@ -290,16 +288,35 @@ def _least(item: ScreenedItem) -> str:
 
 def growth_outside(record: ItemRecord) -> str:
     """Tell what grows beside the critical modes, how fast if known, and at which frequency; "" if nothing does."""
-    followed = np.delete(record.eigenvalues, record.critical)
-    known = followed[followed.real > UNSTABLE].tolist()
-    number = record.growing_elsewhere + 2 * len(known)
+    number, fastest = _growing(record)
     if not number:
         return ""
     text = f"{number} eigenvalue{'s grow' if number > 1 else ' grows'} outside of the range"
+    if fastest is None:
+        return f"{text}; `gfor modes` shows how fast"
+    return f"{text}, {'the fastest ' if number > 2 else ''}by {_rate(fastest)}"
+
+
+def growth_in_short(record: ItemRecord) -> str:
+    """The same in a cell: the fastest alone."""
+    number, fastest = _growing(record)
+    if not number:
+        return ""
+    return "how fast is not known" if fastest is None else f"+{_rate(fastest)}"
+
+
+def _growing(record: ItemRecord) -> tuple[int, complex | None]:
+    """Number of eigenvalues that grow beside the critical modes, and the fastest; None where they were only counted."""
+    followed = np.delete(record.eigenvalues, record.critical)
+    known = followed[followed.real > UNSTABLE].tolist()
+    number = record.growing_elsewhere + 2 * len(known)
     if record.fastest is not None:
         known.append(complex(*record.fastest))
     elif record.growing_elsewhere:
-        return f"{text}; `gfor modes` shows how fast"
-    fastest = max(known, key=lambda value: value.real)
-    at = f"at {fastest.imag / (2 * np.pi):.3g} Hz" if fastest.imag else "without an oscillation"
-    return f"{text}, {'the fastest ' if number > 2 else ''}by {fastest.real:.3g} 1/s {at}"
+        return number, None
+    return number, max(known, key=lambda value: value.real, default=None)
+
+
+def _rate(value: complex) -> str:
+    at = f"at {value.imag / (2 * np.pi):.3g} Hz" if value.imag else "without an oscillation"
+    return f"{value.real:.3g} 1/s {at}"

@@ -99,16 +99,18 @@ def screened(folder):
         outage = SimpleNamespace(name=name, elements=() if name == "intact" else (name,))
         point = SimpleNamespace(name="base")
         items.append(SimpleNamespace(point=point, outage=outage, record=record))
-    plan = SimpleNamespace(prepared=both[0])
+    plan = SimpleNamespace(prepared=both[0], points=(point,))
     return SimpleNamespace(result=SimpleNamespace(items=items, plan=plan))
 
 
 def test_a_screening_says_what_is_beyond_and_what_was_before(tmp_path):
     summary = screened(tmp_path)
     said = limits_sentence(summary)
-    assert said.startswith("At 2 of 2 items a branch is beyond its rating, most line_")
+    assert said.startswith("At 2 of 2 points and outages a branch is beyond its rating, most line_")
     assert "Beyond it without an outage already: line_" in said
-    assert "At 1 of 2 items a bus voltage is outside of its band, furthest bus_5" in said
+    assert (
+        "At 1 of 2 points and outages a bus voltage is outside of its band, furthest bus_5" in said
+    )
     assert limits_table(summary) is not None
     after = limits_json(summary)["items"][1]
     before = {one["branch"]: one["beyond_in_intact_network"] for one in after["branches"]}
@@ -133,12 +135,14 @@ def test_items_without_a_power_flow_are_not_counted(tmp_path):
         point=SimpleNamespace(name="base"),
     )
     summary.result.items.append(lost)
-    assert limits_sentence(summary).startswith("At 2 of 2 items a branch is beyond its rating")
+    assert limits_sentence(summary).startswith(
+        "At 2 of 2 points and outages a branch is beyond its rating"
+    )
 
 
 def test_a_file_without_ratings_and_bands_has_nothing_said(tmp_path):
     summary = screened(tmp_path)
-    summary.result.plan = SimpleNamespace(prepared=bare_scenario())
+    summary.result.plan = SimpleNamespace(prepared=bare_scenario(), points=())
     for item in summary.result.items:
         item.record = ItemRecord(Status.COMPUTED)
     assert limits_sentence(summary) == ""

@@ -59,7 +59,7 @@ def test_trips_leave_the_verdict_open_and_all_outputs_name_them(screened):
     assert found.stable is None
     assert STUDY.code(found, True) == 1
     assert "what relays leave at 1 of them is not judged" in found.verdict
-    assert "in 1 of 2 relays or models trip, or motors stall, first case, line_1_2" in found.verdict
+    assert "in 1 of 2 relays or models trip, or motors stall, first line_1_2" in found.verdict
     told = json.loads(json.dumps(found.as_json()))["runs"]
     assert [(run["outage"], len(run["trips"])) for run in told] == [("line_1_2", 1), ("sg2", 0)]
     (in_json,) = told[0]["trips"]
@@ -114,7 +114,7 @@ def test_a_motor_that_stalls_after_an_outage_is_found(screened):
     (told,) = run_of(found, "sg2").trips
     assert (told.of, told.record) == ("motor2_1", "")
     assert told.message.startswith("motor2_1 stalls: its speed falls below 0.5 pu at t = ")
-    assert "or motors stall, first case, sg2: motor2_1 at" in found.verdict
+    assert "or motors stall, first sg2: motor2_1 at" in found.verdict
 
 
 def test_a_run_that_cannot_be_is_an_item_that_is_not_judged(screened, monkeypatch):
