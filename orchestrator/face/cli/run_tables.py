@@ -1,5 +1,6 @@
 """Tables of ``gfor run``, the worst result first."""
 
+import math
 from collections.abc import Sequence
 
 from rich.console import Console
@@ -64,19 +65,45 @@ def print_run(
     ring_downs = tables.ring_downs(results)
     if ring_downs is not None:
         console.print("", ring_downs)
-    console.print("", tables.steady_states(modes))
-    if any(r.shifts for r in results):
-        console.print("", tables.mode_shifts(results))
     if any(r.linear is not None for r in results):
-        console.print("", tables.linear_differences(results))
-    console.print("", tables.run_statistics(results), "")
-    for r in results:
-        if r.statistics and r.statistics.adaptive:
-            words = on_adaptive_steps(r.modes.prepared, r.statistics.adaptive)
-            console.print(escape(words), soft_wrap=True, highlight=False)
-    for words in dict.fromkeys(
-        text for r in results if r.statistics and (text := on_one_thread(r.statistics))
-    ):
-        console.print(escape(words), soft_wrap=True)
+        console.print("", tables.linear_differences(results), "")
+    if details:
+        console.print(tables.steady_states(modes))
+        if any(r.shifts for r in results):
+            console.print("", tables.mode_shifts(results))
+        console.print("", tables.run_statistics(results), "")
+    else:
+        console.print(escape(how_computed(results)), soft_wrap=True, highlight=False)
+    for words in _on_steps(results):
+        console.print(escape(words), soft_wrap=True, highlight=False)
     if details:
         print_details(console, modes)
+
+
+def how_computed(results: Sequence[RunResult]) -> str:
+    """The tables of the details in one line: the worst of all scenarios."""
+    residuals = [r.modes.operating_point.residual for r in results]
+    known = [one for one in residuals if not math.isnan(one)]
+    told = [f"steady states hold to {max(known):.1e} in a communication step"] if known else []
+    shifts = [abs(shift) for r in results if (shift := r.own_shift) is not None]
+    if shifts:
+        told.append(f"the step moves the electromechanical mode by {max(shifts):.1e} rad/s")
+    speeds = [r.statistics.real_time_factor for r in results if r.statistics]
+    if speeds:
+        told.append(f"{_range(speeds)} times as fast as real time")
+    return f"How it was computed: {'; '.join([*told, '--details has the tables'])}."
+
+
+def _range(values: Sequence[float]) -> str:
+    low, high = f"{min(values):.3g}", f"{max(values):.3g}"
+    return low if low == high else f"{low} to {high}"
+
+
+def _on_steps(results: Sequence[RunResult]) -> list[str]:
+    """Sentences on steps that follow a tolerance, and on threads."""
+    texts = []
+    for r in results:
+        if r.statistics and r.statistics.adaptive:
+            texts.append(on_adaptive_steps(r.modes.prepared, r.statistics.adaptive))
+    threads = [on_one_thread(r.statistics) for r in results if r.statistics]
+    return [*texts, *dict.fromkeys(filter(None, threads))]

@@ -93,17 +93,29 @@ def say(kind: str, texts: Iterable[str]) -> None:
 def print_named_modes(
     console: Console, results: Sequence[ModesResult], *, shapes: bool = True
 ) -> None:
-    """The modes that a case names, beside somebody else's figures for them, and who swings in them."""
-    from orchestrator.studies.runs import tables  # noqa: PLC0415 - imports all that a run needs
+    """The modes that a case names, beside somebody else's figures for them, and who swings in them.
 
+    Figures that the answers show already are not repeated."""
+    from orchestrator.studies.runs import tables  # noqa: PLC0415 - imports all that a run needs
+    from orchestrator.studies.runs.answer_of_modes import name_of_answers  # noqa: PLC0415 - as well
+
+    shaped = shapes and any(r.swing and (r.named or r.modes) for r in results)
+    told = shaped and bool(name_of_answers(results))
+    if not told and any(r.named or r.unnamed for r in results):
+        reference = results[0].prepared.case.table.reference
+        console.print(tables.named_modes(results, reference.title if reference else None))
+        print_reference(console, results)
+        console.print("")
+    if shaped:
+        console.print(tables.mode_shapes(results, with_values=told), "")
+
+
+def print_reference(console: Console, results: Sequence[ModesResult]) -> None:
+    """Where somebody else's figures come from; nothing where there are none."""
     reference = results[0].prepared.case.table.reference
-    if any(r.named or r.unnamed for r in results):
-        title = reference.title if reference else None
-        console.print(tables.named_modes(results, title))
-        if reference and any(r.references for r in results):
-            console.print(escape(f"{title}: {reference.source}"), style="dim", soft_wrap=True)
-    if shapes and any(r.swing and (r.named or r.modes) for r in results):
-        console.print("", tables.mode_shapes(results), "")
+    if reference and any(r.references for r in results):
+        text = f"{reference.title}: {reference.source}"
+        console.print(escape(text), style="dim", soft_wrap=True, highlight=False)
 
 
 def print_sources(console: Console, results: Sequence[ModesResult]) -> None:

@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from orchestrator.face.cli.arguments import switch
-from orchestrator.face.cli.terminal import print_parts
+from orchestrator.face.cli.terminal import print_parts, print_reference
 from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ
 from orchestrator.linear.spectra.stability import Stability
 from orchestrator.output.report.colours import OF_VERDICTS
@@ -15,7 +15,7 @@ from orchestrator.output.report.verdict_sentence import VerdictSentence
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.runs import tables
 from orchestrator.studies.runs.answer import ScenarioAnswer
-from orchestrator.studies.runs.answers_table import answers_table, outside
+from orchestrator.studies.runs.answers_table import answers_table, other_figures, outside
 
 
 def add_verdict_argument(parser: argparse.ArgumentParser) -> None:
@@ -56,7 +56,8 @@ def _headline(verdicts: Mapping[str, Stability]) -> str:
 
 
 def add_details_argument(parser: argparse.ArgumentParser) -> None:
-    switch(parser, "--details", "print also the power flow, and each verdict with its eigenvalue")
+    words = "print also the power flow, each verdict with its eigenvalue, and how it was computed"
+    switch(parser, "--details", words)
 
 
 def print_answers(
@@ -66,7 +67,11 @@ def print_answers(
     beside: Sequence[str],
 ) -> None:
     ranges = [r.hidden.frequency_range for r in results if r.hidden is not None]
-    console.print(answers_table(answers, ranges[0] if ranges else ELECTROMECHANICAL_HZ))
+    looked_at = ranges[0] if ranges else ELECTROMECHANICAL_HZ
+    others = other_figures(results)
+    console.print(answers_table(answers, looked_at, others))
+    if others.figures:
+        print_reference(console, results)
     print_parts(console, map(escape, beside))
     rest = outside(results)
     if rest:

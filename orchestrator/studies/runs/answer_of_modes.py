@@ -1,5 +1,7 @@
 """The answer by eigenvalues: whether a scenario is stable, and which swing is damped least."""
 
+from collections.abc import Sequence
+
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.linear.spectra.stability import Cause
 from orchestrator.output.report.short_texts import first_few, short
@@ -24,6 +26,19 @@ def of_modes(result: ModesResult) -> ScenarioAnswer:
 
 def least_damped(result: ModesResult) -> Mode | None:
     return min(result.modes, key=lambda mode: mode.damping_percent, default=None)
+
+
+def name_of_answers(results: Sequence[ModesResult]) -> str:
+    """The only name that a case looks for, if every answer's mode has it; else ""."""
+    names = {name for r in results for name in (*r.named, *r.unnamed)}
+    (name, *others) = names or {""}
+    told = name and not others and all(_tells_of(r, name) for r in results)
+    return name if told else ""
+
+
+def _tells_of(result: ModesResult, name: str) -> bool:
+    mode = result.named.get(name)
+    return mode is not None and mode is least_damped(result)
 
 
 def _remark(result: ModesResult, mode: Mode | None) -> str:

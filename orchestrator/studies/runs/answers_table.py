@@ -1,6 +1,7 @@
 """Answers of scenarios as a table for a terminal, and what lies outside of its range."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from rich.table import Table
 from rich.text import Text
@@ -11,19 +12,52 @@ from orchestrator.output.report.short_texts import short
 from orchestrator.output.report.terminal_tables import make_table
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.runs.answer import LONGEST_REMARK, ScenarioAnswer
+from orchestrator.studies.runs.answer_of_modes import name_of_answers
 
 
-def answers_table(answers: Sequence[ScenarioAnswer], frequency_range: tuple[float, float]) -> Table:
+@dataclass(frozen=True)
+class OtherFigures:
+    """Somebody else's figures for the answers' modes, which stand in brackets behind ours.
+
+    ``figures``: frequency [Hz] and damping ratio [%] for each answer, None where they have none."""
+
+    title: str = ""
+    figures: Sequence[tuple[float, float] | None] = ()
+
+    def heading(self, own: str) -> str:
+        return f"{own} ({self.title})" if any(self.figures) else own
+
+
+def other_figures(results: Sequence[ModesResult]) -> OtherFigures:
+    """Return the figures that the case has for its only named mode, if that is every answer's mode."""
+    name = name_of_answers(results)
+    reference = results[0].prepared.case.table.reference if name else None
+    if reference is None:
+        return OtherFigures()
+    tables = [r.references.get(name) for r in results]
+    figures = [(one.frequency_hz, one.damping_percent) if one else None for one in tables]
+    return OtherFigures(reference.title, figures)
+
+
+def answers_table(
+    answers: Sequence[ScenarioAnswer],
+    frequency_range: tuple[float, float],
+    others: OtherFigures | None = None,
+) -> Table:
     low, high = frequency_range
-    table = make_table("", "Scenario", "Verdict", "f [Hz]", "Damping [%]", left=2)
+    others = others or OtherFigures()
+    theirs = dict(enumerate(others.figures))
+    figures = (others.heading("f [Hz]"), others.heading("Damping [%]"))
+    table = make_table("", "Scenario", "Verdict", *figures, left=2)
     table.title = None
     when = ", before → after the events" if any(answer.became for answer in answers) else ""
     table.add_column(
         f"Least damped mode from {low:g} to {high:g} Hz{when}: who swings; remark", overflow="fold"
     )
-    for answer in answers:
+    for k, answer in enumerate(answers):
         word = Text(answer.verdict, style=f"bold {OF_VERDICTS[answer.good]}")
-        figures = _figures([mode for mode in (answer.mode, answer.became) if mode])
+        modes = [mode for mode in (answer.mode, answer.became) if mode]
+        figures = _figures(modes, theirs.get(k))
         table.add_row(answer.subject, word, *figures, answer.remark)
         another = answer.another_after
         if another:
@@ -34,11 +68,14 @@ def answers_table(answers: Sequence[ScenarioAnswer], frequency_range: tuple[floa
     return table
 
 
-def _figures(modes: Sequence[Mode]) -> tuple[str, str]:
-    """Frequency and damping of one mode, before and after the events."""
-    hertz = " → ".join(f"{mode.frequency_hz:.3f}" for mode in modes)
-    percent = " → ".join(f"{mode.damping_percent:.2f}" for mode in modes)
-    return hertz or "–", percent or "–"
+def _figures(modes: Sequence[Mode], theirs: tuple[float, float] | None = None) -> tuple[str, str]:
+    """Frequency and damping of one mode, before and after the events; somebody else's are those before them."""
+    hertz = [f"{mode.frequency_hz:.3f}" for mode in modes]
+    percent = [f"{mode.damping_percent:.2f}" for mode in modes]
+    if theirs and modes:
+        hertz[0] += f" ({theirs[0]:.2f})"
+        percent[0] += f" ({theirs[1]:.2f})"
+    return " → ".join(hertz) or "–", " → ".join(percent) or "–"
 
 
 def outside(results: Sequence[ModesResult]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -88,6 +89,18 @@ class RunResult:
     # what kept each foreign FMU from the rest of the machine, by component
     protections: dict[str, tuple[Protection, ...]] = field(default_factory=dict)
     after: ModesResult | str | None = None  # as `modes_after` has it
+
+    @property
+    def own_shift(self) -> float | None:
+        """How far the run's own step and schedule move the electromechanical mode [rad/s]; None if not known."""
+        prepared = self.modes.prepared
+        own = (
+            one.shift
+            for one in self.shifts
+            if one.schedule == prepared.schedule.name
+            and math.isclose(one.step_size, prepared.step_size)
+        )
+        return next(own, None)
 
     @property
     def went_unstable(self) -> list[Finding]:

@@ -9,6 +9,7 @@ from rich.table import Table
 from orchestrator.cases.scenario.flow_figures import power_flow_json
 from orchestrator.output.report import mode_tables
 from orchestrator.output.report.column_table import ShownTable
+from orchestrator.output.report.mode_tables import eigenvalue_text
 from orchestrator.output.report.power_flow import COLUMNS, flow_table, totals
 from orchestrator.output.report.short_texts import first_few, share_text
 from orchestrator.output.report.terminal_tables import make_table
@@ -43,22 +44,26 @@ def named_modes(results: Sequence[ModesResult], reference: str | None) -> ShownT
     return mode_tables.named_modes([named_json(r) for r in results], reference)
 
 
-def mode_shapes(results: Sequence[ModesResult]) -> Table:
-    """Who swings against whom in the modes with a name, or in all where none has one, and who takes part."""
+def mode_shapes(results: Sequence[ModesResult], *, with_values: bool = False) -> Table:
+    """Who swings against whom in the modes with a name, or in all where none has one, and who takes part.
+
+    ``with_values``: shows the eigenvalues as well, if no other table does."""
     names = list(dict.fromkeys(name for r in results for name in r.named))
     entries = [(name, r, r.named[name]) for name in names for r in results if name in r.named]
     if not names:
         entries = [(f"{mode.frequency_hz:.3f} Hz", r, mode) for r in results for mode in r.modes]
     groups = [mode.swing_groups(r.swing) for _, r, mode in entries]
     across, areas = any(group.between for group in groups), any(r.areas for r in results)
-    columns = ["Mode", "Swing together", "Against"]
+    columns = ["Scenario" if len(names) == 1 else "Mode"] + ["Mode [rad/s]"] * with_values
+    columns += ["Swing together", "Against"]
     columns += ["In between"] * across + ["Participation by component"] + ["By area"] * areas
     table = make_table("Mode shapes", *columns, left=len(columns))
     for (label, r, mode), group in zip(entries, groups, strict=True):
         sides = [first_few(side, str) for side in r.swing_of(mode)]
         between = [f"{s.partition('.')[0]} {angle:+.0f}°" for s, angle in group.between.items()]
         sides += [first_few(between, str)] * across
-        row = [r.prepared.title if len(names) == 1 else f"{label}: {r.prepared.title}", *sides]
+        row = [r.prepared.title if len(names) == 1 else f"{label}: {r.prepared.title}"]
+        row += [eigenvalue_text(mode.eigenvalue)] * with_values + sides
         row.append(first_few(mode.by_component.items(), share_text))
         row += [first_few(r.by_area(mode).items(), share_text)] if areas else []
         table.add_row(*row)

@@ -492,7 +492,7 @@ def test_summary_and_tables_show_the_same_mode(results):
         scenario["steps_per_second"] * scenario["step_size_s"]
     )
     assert scenario["threads"] == 1
-    assert "Times real time" in " ".join(printed.split())
+    assert "times as fast as real time" in " ".join(printed.split())
     assert "(Python-backed); with --native several threads can." in " ".join(printed.split())
     mode = scenario["modes"]["electromechanical"]
     assert f"{mode['real']:+.4f} ± j{mode['imag']:.4f}" in printed

@@ -62,23 +62,60 @@ def agrees(row, heading, wanted):
 # -- the terminal -------------------------------------------------------------------------------
 
 
-def test_the_terminals_modes(printed, summary):
-    rows = table(printed, "Electromechanical mode")
-    assert [row["Scenario"] for row in rows] == list(summary)
-    for row in rows:
+def test_the_terminals_modes(studied, printed, summary):
+    """The answer has the mode's figures, the paper's in brackets; no other table says them again."""
+    assert not [title for title in printed if "Electromechanical mode" in title]
+    answers = on_terminal("\n" + studied[1])[""]
+    shapes = table(printed, "Mode shapes")
+    assert [row["Scenario"] for row in shapes] == [row["Scenario"] for row in answers]
+    assert [row["Scenario"] for row in answers] == list(summary)
+    for answer, shape in zip(answers, shapes, strict=True):
+        row = {**answer, **shape}
         s = summary[row["Scenario"]]
         mode, theirs = s["modes"]["electromechanical"], s["references"]["electromechanical"]
         assert eigenvalue(row["Mode [rad/s]"]) == pytest.approx(
             complex(mode["real"], mode["imag"]), abs=1e-4
         )
-        agrees(row, "f [Hz]", mode["frequency_hz"])
-        agrees(row, "Damping [%]", mode["damping_percent"])
-        agrees(row, "paper: f [Hz]", theirs["frequency_hz"])
-        agrees(row, "Damping [%] 2", theirs["damping_percent"])
+        for heading, key in (("f [Hz]", "frequency_hz"), ("Damping [%]", "damping_percent")):
+            ours, others = row[f"{heading} (paper)"].rstrip(")").split(" (")
+            agrees({heading: ours}, heading, mode[key])
+            agrees({heading: others}, heading, theirs[key])
 
 
-def test_the_terminals_steady_state(printed, summary):
-    rows = table(printed, "Steady state")
+def test_one_line_tells_how_a_run_was_computed(studied, summary):
+    """The worst of all scenarios, with the remedy that shows the tables."""
+    (line,) = [line for line in studied[1].splitlines() if line.startswith("How it was computed")]
+    residual = float(re.search(r"hold to (\S+) in", line)[1])
+    assert residual == pytest.approx(max(s["residual"] for s in summary.values()), rel=0.06)
+    moved = float(re.search(r"mode by (\S+) rad/s", line)[1])
+    rows = csv.DictReader((studied[0] / "step_size.csv").read_text(encoding="utf-8").splitlines())
+    shifts = [
+        float(row["shift [rad/s]"])
+        for row in rows
+        if row["schedule"] == "gauss-seidel" and float(row["step size [s]"]) == 1e-4
+    ]
+    assert len(shifts) == len(summary)
+    assert moved == pytest.approx(max(shifts), rel=0.06)
+    assert line.endswith("--details has the tables.")
+
+
+@pytest.fixture(scope="module")
+def detailed(tmp_path_factory):
+    """A short run of the same scenarios with details: its folder, and its tables."""
+    folder, printed = tmp_path_factory.mktemp("details"), StringIO()
+    words = ["run", "two_area", *SCENARIOS, "--stop", "1", "--details", "--no-csv"]
+    with redirect_stdout(printed):
+        assert main([*words, "--out", str(folder)]) == 0
+    assert "How it was computed" not in printed.getvalue()
+    return folder, on_terminal(printed.getvalue())
+
+
+def test_the_details_of_a_run_have_its_steady_state(detailed):
+    folder, tables = detailed
+    scenarios = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["scenarios"]
+    summary = {s["title"]: s for s in scenarios}
+    assert table(tables, "Run")
+    rows = table(tables, "Steady state")
     assert [row["Scenario"] for row in rows] == list(summary)
     for row in rows:
         s = summary[row["Scenario"]]
@@ -110,12 +147,12 @@ def shifts(folder):
         }
 
 
-@pytest.mark.parametrize("where", ["printed", "page"])
-def test_the_shift_by_the_communication_step(where, request, studied, summary):
-    rows, known = (
-        table(request.getfixturevalue(where), "How far each communication step", "[rad/s]"),
-        shifts(studied[0]),
-    )
+@pytest.mark.parametrize("where", ["details", "page"])
+def test_the_shift_by_the_communication_step(where, request, summary):
+    folder, tables = request.getfixturevalue("studied" if where == "page" else "detailed")
+    if where == "page":
+        tables = request.getfixturevalue("page")
+    rows, known = table(tables, "How far each communication step", "[rad/s]"), shifts(folder)
     cells = 0
     for row in rows:
         name = summary[row["Scenario"]]["name"]
