@@ -23,7 +23,7 @@ def item(**record):
 def test_an_outage_without_any_verdict_is_told_by_its_first_point():
     plan = SimpleNamespace(
         wanted=SimpleNamespace(damping=0.2),
-        points=("p07",),
+        points=("p07",) * 7,
         outages=(),
         prepared=SimpleNamespace(regions=SimpleNamespace(has_areas=False)),
     )
@@ -57,7 +57,7 @@ def test_components_are_named_by_their_shares():
 
 
 def test_a_stretch_is_joined_by_the_modes_of_its_anchor_and_of_its_last_intact_item(monkeypatch):
-    monkeypatch.setattr(point, "_as_kept", lambda modes: modes)
+    monkeypatch.setattr(point, "_as_kept", lambda found: found.modes)
     results = [
         SimpleNamespace(found=SimpleNamespace(modes=name), record=name)
         for name in ("anchor", "one", "out")
