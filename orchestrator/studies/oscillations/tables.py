@@ -39,4 +39,8 @@ def parts_of(opinion: Opinion) -> str:
     giving = [(name, share) for name, share in opinion.ranking if share >= _LEAST_PART]
     if opinion.others_give:
         return "these places take more than they give"
-    return ", ".join(f"{name} {100 * share:.0f} %" for name, share in giving[:_PLACES]) or "none"
+    parts = ", ".join(f"{name} {100 * share:.0f} %" for name, share in giving[:_PLACES]) or "none"
+    observed = [name for name, _ in opinion.ranking]
+    if opinion.place is None or opinion.place in observed:
+        return parts
+    return f"{opinion.place} is not observed; of those that are: {parts}"

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.studies.oscillations.location import DEF, QV_PHASE, Opinion
+from orchestrator.studies.oscillations.models import OWN_MODEL
 from orchestrator.studies.oscillations.page import envelope_curves
 from orchestrator.studies.oscillations.tables import parts_of
 from orchestrator.studies.oscillations.verdict import locate
@@ -58,3 +59,11 @@ def test_parts_of_what_is_given(ranking, words):
     if ranking == [("a", -1.0)]:  # takes alone: nobody gives
         assert given.others_give is False
     assert parts_of(given) == words
+
+
+def test_a_named_place_that_is_not_observed_is_told_beside_the_parts_of_those_that_are():
+    """A load was named, and its row gave 76 % to a machine."""
+    ranking = (("sg2", 0.76), ("sg1", 0.21))
+    load = Opinion(OWN_MODEL, "grid.load_7", True, "", ranking)
+    assert parts_of(load) == "grid.load_7 is not observed; of those that are: sg2 76 %, sg1 21 %"
+    assert parts_of(Opinion(OWN_MODEL, "sg2", True, "", ranking)) == "sg2 76 %, sg1 21 %"
