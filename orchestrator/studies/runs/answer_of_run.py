@@ -261,9 +261,7 @@ def _of_a_short_run(shown: _Response) -> ScenarioAnswer | None:
 def _of_settling(shown: _Response) -> ScenarioAnswer:
     rest = f", before the events at {shown.later}" if shown.later else ""
     rest += f"; {shown.by_modes.remark}" if shown.by_modes.remark else ""
-    return shown.answer(
-        True, "stable", f"keeps synchronism and settles until {shown.end:g} s{rest}"
-    )
+    return shown.answer(True, "stable", f"keeps synchronism and settles by {shown.end:g} s{rest}")
 
 
 _RULES: tuple[Callable[[_Response], ScenarioAnswer | None], ...] = (

@@ -72,13 +72,13 @@ def finding(kind, **more):
 @pytest.mark.parametrize(
     ("findings", "stable", "word", "remark"),
     [
-        ([], True, "stable", "keeps synchronism and settles until 5 s"),
+        ([], True, "stable", "keeps synchronism and settles by 5 s"),
         # a limit that the model has
         (
             [finding("active_limit", what="limit", until=2.0)],
             True,
             "stable",
-            "keeps synchronism and settles until 5 s",
+            "keeps synchronism and settles by 5 s",
         ),
         (
             [finding("active_limit", what="limit")],
@@ -112,8 +112,8 @@ def test_the_verdict_of_a_run_is_its_own(findings, stable, word, remark):
     ("events", "good", "remark"),
     [
         ((), True, "sg1 against sg2"),
-        ((4.9,), True, "settles until 5 s; sg1"),
-        ((1.0, 6.0), True, "settles until 5 s, before the events at 6 s; sg1"),
+        ((4.9,), True, "settles by 5 s; sg1"),
+        ((1.0, 6.0), True, "settles by 5 s, before the events at 6 s; sg1"),
         ((5.0, 6.0), None, "the run ends at 5 s, before its events (t = 5 s, 6 s)"),
     ],
 )
