@@ -136,7 +136,7 @@ def _misfits(findings: Iterable[Sequence[Mapping[str, Any]]]) -> list[str]:
 
 
 def _criteria(found: Certificate) -> PlainTable:
-    table = make_table("Criteria", "Row", "Criterion", "Found", "Margin", "", left=99)
+    table = make_table("Criteria", "Row", "Criterion", "Found", "Margin", "Verdict", left=99)
     for v in found.verdicts:
         for f in v.findings:
             table.add_row(v.row.name, f.criterion, short(f.text, 160), margin_of(f), v.word(f))

@@ -64,9 +64,9 @@ def print_run(
     print_sources(console, modes)
     ring_downs = tables.ring_downs(results)
     if ring_downs is not None:
-        console.print("", ring_downs)
+        console.print(ring_downs, "")
     if any(r.linear is not None for r in results):
-        console.print("", tables.linear_differences(results), "")
+        console.print(tables.linear_differences(results), "")
     if details:
         console.print(tables.steady_states(modes))
         if any(r.shifts for r in results):
