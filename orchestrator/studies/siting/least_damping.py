@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from orchestrator.core.errors import AnalysisError
 from orchestrator.core.threads import one_thread
+from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.followed_swings import (
     follow_swings,
     search_swings,
@@ -26,9 +27,9 @@ from orchestrator.studies.pod_design.lead_lag import NO_COMPENSATION
 
 GROWS = -1.0  # in the place of a damping ratio, where something grows
 
-MOST_WHOLE = 1000
-"""Up to this number of states all eigenvalues are computed with each setting, which takes a second; with 3,000 it takes
-six, and following the swings two to four."""
+MOST_WHOLE = 2500
+"""Up to this number of states all eigenvalues are computed with each setting. With 3,000 they take 6 s of processor
+time, and following the swings 4 s; the first grow with the third power of the states."""
 
 
 class LeastDamping:
@@ -38,7 +39,7 @@ class LeastDamping:
 
     def __init__(self, loop: PodLoop, known: Sequence[Mode] = ()) -> None:
         self._loop, self._known = loop, known
-        self._swings: dict[PodSetting, RefinedModes] = {}
+        self._swings: dict[PodSetting, RefinedModes | None] = {}
         self._whole: dict[PodSetting, NDArray[np.complex128]] = {}
         self._found: dict[PodSetting, float] = {}
 
@@ -74,15 +75,14 @@ class LeastDamping:
 
     def _followed(self, setting: PodSetting) -> RefinedModes | None:
         """The swings from those of the nearest smaller gain with the same lead/lag; None where only all eigenvalues
-        show them."""
+        show them, which take less than a search."""
         if setting not in self._swings:
             before = self._nearest(setting)
             model = self._loop.model(setting)
             found = None if before is None else follow_swings(model, before)
-            try:
-                self._swings[setting] = search_swings(model) if found is None else found
-            except AnalysisError:
-                return None
+            if found is None and not setting.gain:  # from here all others are followed
+                found = _searched(model)
+            self._swings[setting] = found
         return self._swings[setting]
 
     def _nearest(self, setting: PodSetting) -> RefinedModes | None:
@@ -90,8 +90,16 @@ class LeastDamping:
             return swings_among(self._known, self._loop.model(setting)) if self._known else None
         alike = [
             one
-            for one in self._swings
+            for one, swings in self._swings.items()
             if one.filters == setting.filters and 0 < one.gain < setting.gain
+            if swings is not None
         ]
         nearest = max(alike, key=lambda one: one.gain, default=PodSetting(0.0, NO_COMPENSATION))
         return self._followed(nearest)
+
+
+def _searched(model: LinearModel) -> RefinedModes | None:
+    try:
+        return search_swings(model)
+    except AnalysisError:
+        return None
