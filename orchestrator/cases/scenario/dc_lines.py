@@ -1,6 +1,6 @@
 """DC lines with models: their stations as components, the connections of these, and their operating point."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 from orchestrator.cases.draft import Draft, UnitOrigin
 from orchestrator.cases.form.schema import ComponentTable, UnitsTable
@@ -11,7 +11,7 @@ from orchestrator.cases.networks.psse.dc_line_models import (
     remarks_of_lines,
 )
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
-from orchestrator.systems.coupling.system import ComponentPlan
+from orchestrator.systems.coupling.system import ComponentPlan, System
 
 _PHASOR = "_phasor"  # end of the names of phasor models, which the stations are alone
 _COMMON = (
@@ -116,3 +116,12 @@ def _power_sent(rectifier: ComponentPlan) -> float:
 def _constant_inputs(station: StationOfLine) -> dict[str, float]:
     """Return what the inputs of a station are held at whose bus is beyond what is studied."""
     return {} if station.held is None else {"v_re": station.held.real, "v_im": station.held.imag}
+
+
+def other_stations(system: System, units: Collection[str]) -> dict[str, str]:
+    """Return the stations of DC lines among units, each with the one at its other end.
+
+    Two units that feed each other are such stations."""
+    fed = {(c.source.component, c.target.component) for c in system.connections}
+    both = [(one, other) for one, other in sorted(fed) if (other, one) in fed]
+    return {one: other for one, other in both if one in units and other in units}

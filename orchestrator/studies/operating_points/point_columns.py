@@ -11,6 +11,7 @@ from orchestrator.cases.form.schema import Value
 from orchestrator.cases.form.values import convert
 from orchestrator.cases.networks.element_names import ElementNames
 from orchestrator.cases.networks.step_ups import own_branches
+from orchestrator.cases.scenario.dc_lines import other_stations
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError, few
 from orchestrator.core.units import read_value
@@ -72,7 +73,7 @@ class Elements:
             step_ups=own_branches(network, units),
             file=prepared.names,
             ends=ends,
-            other_ends=_other_ends(prepared, units),
+            other_ends=other_stations(prepared.system, units),
             of_phasors=prepared.system.components[table.grid].is_of_phasors,
         )
 
@@ -302,12 +303,3 @@ def _positive(column: str, text: str) -> float:
     if not value > 0:
         raise ValueError(f"{column} = {text}; it must exceed 0")
     return value
-
-
-def _other_ends(prepared: PreparedScenario, units: Mapping[str, str]) -> dict[str, str]:
-    """Return the stations of DC lines, each with the one at its other end.
-
-    Two units that feed each other are such stations."""
-    fed = {(c.source.component, c.target.component) for c in prepared.system.connections}
-    both = [(one, other) for one, other in sorted(fed) if (other, one) in fed]
-    return {one: other for one, other in both if one in units and other in units}

@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping
 
+from orchestrator.cases.scenario.dc_lines import other_stations
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import CosimError
 from orchestrator.linear.spectra.mode_tracking import ModeSet, match
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.simulation.watch.settings import left_changed
 from orchestrator.studies.modes.modes import ModesResult, compute_modes
-from orchestrator.studies.operating_points.point_columns import Elements
 
 
 def lasting_changes(prepared: PreparedScenario) -> Mapping[str, float | bool]:
@@ -53,9 +53,10 @@ def _with_other_ends(
     """The values with both stations of a DC line out of service where one is: its line carries nothing any more."""
     if prepared.network is None:
         return values
+    units = {port.name for port in prepared.network.ports}
     further = {
         key.replace(f"{lost}.connected", f"{other}.connected"): False
-        for lost, other in Elements.of(prepared).other_ends.items()
+        for lost, other in other_stations(prepared.system, units).items()
         for key, value in values.items()
         if value is False and f".{key}".endswith(f".{lost}.connected")
     }

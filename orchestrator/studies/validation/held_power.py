@@ -18,7 +18,7 @@ _ROUNDING = 1e-11  # of the largest value: what a simulation at rest moves by
 
 
 @dataclass(frozen=True)
-class HeldPower:
+class PowerHolds:
     """Holds of one channel: how many, and the time that the middle one and the longest last [s]."""
 
     count: int
@@ -26,7 +26,7 @@ class HeldPower:
     longest: float
 
 
-def held_power(times: Numbers, values: Numbers) -> HeldPower | None:
+def held_power(times: Numbers, values: Numbers) -> PowerHolds | None:
     """Holds of a channel over most of the time in which it moves; None where it is not held.
 
     One that rests before the event or after it is not held: the count goes from the first change to the last. With a
@@ -51,4 +51,4 @@ def held_power(times: Numbers, values: Numbers) -> HeldPower | None:
     if float(np.median(jumps)) < _STEPS * float(apart[apart > rounding].min()):
         return None
     lengths = [float(times[first + high] - times[first + low]) for low, high in holds]
-    return HeldPower(len(holds), float(np.median(lengths)), max(lengths))
+    return PowerHolds(len(holds), float(np.median(lengths)), max(lengths))
