@@ -223,7 +223,7 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
         "orchestrator.devices.acceptance.shifted_clock",
         "orchestrator.devices.fmi.bound_component",
         "orchestrator.devices.fmi.fmi3",
-        "orchestrator.devices.sandbox.mailbox",
+        "orchestrator.devices.sandbox.compiled_programs",
     }
     importers = {
         f"orchestrator.{name}" for name in ("cases", "face.agents", "face.api", "face.cli")
@@ -252,7 +252,7 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
         ):
             return within(b, "fmus.vendor_dll")
         if a == "orchestrator.devices.sandbox.wine_program":
-            return b in ("fmus.toolchain.compiler", "fmus.vendor_dll.memory")
+            return b == "fmus.vendor_dll.memory"
         if a in ("orchestrator.devices.fmi.instance", "orchestrator.systems.ssp.archive"):
             # what was built or unpacked here, and is intact, is trusted
             return b == "fmus.toolchain.cache"

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import sys
 
 import pytest
 
@@ -13,6 +14,7 @@ from fmus.vendor_dll.state_trial import Trial
 from orchestrator.devices.fmi import vendor_files
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.fmi.vendor_files import as_fmu
+from orchestrator.devices.sandbox.dll_process import DllNotLoadedError, DllProcess
 from tests.support.vendor_dlls import compiled, lag
 
 SLOW = lag(begin="usleep(1500000);", head="\n#include <unistd.h>\n")
@@ -227,3 +229,16 @@ def test_a_text_that_never_ends_is_told_as_such(tmp_path):
     )
     with pytest.raises(DllError, match="declares a text of 300000000 bytes; at most 100000"):
         read_dll(compiled(head + source, tmp_path))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Landlock, which binds one thread, is Linux's")
+def test_no_dll_is_loaded_by_a_process_that_had_a_second_thread_before(tmp_path, monkeypatch):
+    """Landlock would not bind it, and nobody would be told."""
+    library = compiled(lag(), tmp_path)
+    begun = "import threading, time\nthreading.Thread(target=time.sleep, args=(60,), daemon=True).start()\n"
+    (tmp_path / "sitecustomize.py").write_text(begun, encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    with pytest.raises(DllError, match="second thread before it closed itself off"):
+        read_dll(library, vendor_files.READER)
+    with pytest.raises(DllNotLoadedError, match="second thread before it closed itself off"):
+        DllProcess(library)

@@ -174,9 +174,12 @@ static int attempted(void) {
 
 
 def test_under_wine_a_dll_neither_reads_nor_writes_the_users_files_nor_opens_sockets(
-    under_wine, tmp_path
+    under_wine, tmp_path, monkeypatch
 ):
-    """It asks Wine's server, which opens files in its place, and the kernel itself."""
+    """It asks Wine's server, which opens files in its place, and the kernel itself.
+
+    NumPy's threads, which machines of several cores have, are not there before a process is closed off."""
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "4")
     secret, written = tmp_path / "secret", tmp_path / "written"
     secret.write_text("a key", encoding="ascii")
     head = (

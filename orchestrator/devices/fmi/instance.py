@@ -16,8 +16,8 @@ from orchestrator.devices.fmi.fmi3 import adapter_path
 from orchestrator.devices.fmi.isolated_component import IsolatedComponent
 from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from orchestrator.devices.fmi.port_mapping import BoundDescription
+from orchestrator.devices.sandbox.compiled_programs import compile_programs
 from orchestrator.devices.sandbox.protections_in_force import Protection
-from orchestrator.devices.sandbox.wine_program import compile_programs
 
 
 def is_ours(path: Path) -> bool:

@@ -31,8 +31,9 @@ from orchestrator.devices.fmi.fmi3 import Fmi3Library, adapter_path
 from orchestrator.devices.fmi.interpreter_turn import turn
 from orchestrator.devices.fmi.messages import Messages, callbacks_for, texts
 from orchestrator.devices.fmi.refused_calls import FATAL, check_log, in_its_words, refusal
+from orchestrator.devices.sandbox.compiled_programs import proxy_path
 from orchestrator.devices.sandbox.wine import NoWineError
-from orchestrator.devices.sandbox.wine_program import WineProgram, proxy_path
+from orchestrator.devices.sandbox.wine_program import WineProgram
 
 # why one thread alone steps an FMU: Python's lock lets one thread run at a time
 PYTHON_BACKED = "Python-backed"

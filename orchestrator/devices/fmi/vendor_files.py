@@ -13,6 +13,7 @@ from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import check_regular
 from orchestrator.core.safe_files import file_hash
 from orchestrator.devices.sandbox import wine
+from orchestrator.devices.sandbox.compiled_programs import compile_programs
 
 DLL_ENDINGS = (".so", ".dll", ".dylib")
 DEVICE_ENDING = ".toml"  # of a file that lays a circuit around a DLL
@@ -33,8 +34,6 @@ def foreign_platforms(library: Path) -> tuple[str, ...]:
         with library.open("rb") as file:
             windows = file.read(2) == b"MZ" and sys.platform == "linux"
         if windows:
-            from orchestrator.devices.sandbox.wine_program import compile_programs  # noqa: PLC0415 - numpy, for others in vain
-
             wine.find_wine()
             compile_programs()  # once, for minutes: before the DLL's time is taken
     except OSError:

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
+from orchestrator.core.errors import InputError
 from orchestrator.devices.sandbox import protections_in_force, wine
 from orchestrator.devices.sandbox.kernel_calls import (
     call,
@@ -176,6 +177,26 @@ def confine(
     )
 
 
+def confine_alone(work: Path, readable: Iterable[Path], *, windows: bool = False) -> None:
+    """Close this process off, which nobody watches over and which tells nobody what is in force.
+
+    Raises
+    ------
+    InputError
+        If a library brought a second thread before: Landlock would not bind it.
+    """
+    if sys.platform == "linux" and _has_threads():
+        raise InputError(
+            "the process for a DLL had a second thread before it closed itself off, so the DLL was not loaded; "
+            "what Python imports at its start (sitecustomize, usercustomize, a .pth file) may begin no thread"
+        )
+    confine(Means(), LAYERS, work, readable, windows=windows)
+
+
+def _has_threads() -> bool:
+    return len(os.listdir("/proc/self/task")) > 1
+
+
 def _tried(wanted: bool, means: Callable[[], None]) -> str:
     """Why a means is not in force; empty where it is."""
     if not wanted:
@@ -188,7 +209,7 @@ def _tried(wanted: bool, means: Callable[[], None]) -> str:
 
 
 def _restrict(means: Means, work: Path, readable: Iterable[Path], more: Sequence[Path]) -> None:
-    if len(os.listdir("/proc/self/task")) > 1:
+    if _has_threads():
         raise OSError(0, "there is a second thread already")
     proc = ["/proc"] if means.own_processes else list(_OF_THE_KERNEL)
     own = [Path("/dev/shm")] if means.read_only else []

@@ -17,7 +17,8 @@ from fmus.vendor_dll.memory import Library, LocalLibrary, Note
 from fmus.vendor_dll.reading import read_interface
 from orchestrator.core.errors import InputError
 from orchestrator.devices.sandbox import wine
-from orchestrator.devices.sandbox.access_restriction import LAYERS, Means, confine
+from orchestrator.devices.sandbox.access_restriction import confine_alone
+from orchestrator.devices.sandbox.compiled_programs import compile_programs
 from orchestrator.devices.sandbox.resource_limits import Limits, apply_limits
 
 PAGE = 4096  # the smallest page of the machines that are known [bytes]
@@ -171,12 +172,12 @@ def _loaded(library: Path, folder: Path, texts: list[str], note: Note) -> Librar
     windows = sys.platform == "linux" and library.read_bytes()[:2] == b"MZ"
     if not windows:
         apply_limits(Limits(), folder, own_users=True)
-        confine(Means(), LAYERS, folder, [library, *files])
+        confine_alone(folder, [library, *files])
         return LocalLibrary(library, note)
-    from orchestrator.devices.sandbox.wine_program import WineLibrary, compile_programs  # noqa: PLC0415 - numpy, for others in vain
-
     programs = compile_programs()
-    confine(Means(), LAYERS, folder, [library, *programs, *files], windows=True)
+    confine_alone(folder, [library, *programs, *files], windows=True)
+    from orchestrator.devices.sandbox.wine_program import WineLibrary  # noqa: PLC0415 - numpy brings threads, so after
+
     return WineLibrary(library, note)
 
 

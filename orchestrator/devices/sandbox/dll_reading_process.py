@@ -10,7 +10,8 @@ from fmus.vendor_dll.memory import LocalLibrary
 from fmus.vendor_dll.reading import answer_for, texts_in
 from orchestrator.core.errors import InputError
 from orchestrator.devices.sandbox import wine
-from orchestrator.devices.sandbox.access_restriction import LAYERS, Means, confine
+from orchestrator.devices.sandbox.access_restriction import confine_alone
+from orchestrator.devices.sandbox.compiled_programs import compile_programs
 
 
 def _files(texts: dict[str, str] | None) -> list[Path]:
@@ -21,25 +22,21 @@ def _files(texts: dict[str, str] | None) -> list[Path]:
 
 
 def _read(library: Path, answer: Path, texts: dict[str, str] | None) -> None:
-    confine(Means(), LAYERS, answer.parent, [library, *_files(texts)])
+    confine_alone(answer.parent, [library, *_files(texts)])
     answer_for(lambda note: LocalLibrary(library, note), answer, texts)
 
 
 def _read_under_wine(library: Path, answer: Path, texts: dict[str, str] | None) -> None:
-    from orchestrator.devices.sandbox.wine_program import WineLibrary, compile_programs  # noqa: PLC0415 - numpy, for others in vain
-
-    try:
-        programs = compile_programs()
-        confine(Means(), LAYERS, answer.parent, [library, *programs, *_files(texts)], windows=True)
-    except (wine.NoWineError, InputError) as error:
-        answer.write_text(json.dumps({"error": str(error)}), encoding="utf-8")
-        return
+    programs = compile_programs()
+    confine_alone(answer.parent, [library, *programs, *_files(texts)], windows=True)
     if texts is not None:
         files = set(map(str, _files(texts)))
         texts = {
             n: f"Z:{text}".replace("/", "\\") if text in files else text
             for n, text in texts.items()
         }
+    from orchestrator.devices.sandbox.wine_program import WineLibrary  # noqa: PLC0415 - numpy brings threads, so after
+
     answer_for(lambda note: WineLibrary(library, note), answer, texts)
     wine.in_process[0].close()
 
@@ -49,4 +46,7 @@ if __name__ == "__main__":
     read = (
         _read_under_wine if sys.platform == "linux" and given.read_bytes()[:2] == b"MZ" else _read
     )
-    read(given, found, texts_in(sys.argv))
+    try:
+        read(given, found, texts_in(sys.argv))
+    except (wine.NoWineError, InputError) as error:
+        found.write_text(json.dumps({"error": str(error)}), encoding="utf-8")

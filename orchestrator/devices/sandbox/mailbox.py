@@ -10,12 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from fmus.toolchain.compiler import compile_here
 from orchestrator.core.errors import InputError
 from orchestrator.core.interrupts import calls
 from orchestrator.core.options import Option
+from orchestrator.devices.sandbox.compiled_programs import mailbox_path
 
-_SOURCE = Path(__file__).with_name("mailbox.c")
 _TEXT, _LOG = 1 << 24, 8192
 MOST, ROOM = 16384, 1 << 18  # references of one question; numbers of a question for many steps
 SET = 1
@@ -93,7 +92,7 @@ class Served(ctypes.Structure):
 def mailbox_library() -> Any:
     """The compiled mailbox; its calls hold Python's lock, as those of an FMU in this process do."""
     try:
-        library = ctypes.PyDLL(str(compile_here(_SOURCE)))
+        library = ctypes.PyDLL(str(mailbox_path()))
     except (OSError, RuntimeError) as error:
         raise InputError(
             f"the mailbox to an FMU's own process is compiled, and {error}; if you trust "

@@ -10,15 +10,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from fmus.toolchain.compiler import TARGETS, compile_for, compile_here, joined_source
 from fmus.toolchain.temporary import own_folder, remove
 from fmus.vendor_dll.memory import LibraryEndedError, Note, Region, unheard
-from orchestrator.core.errors import InputError
 from orchestrator.devices.sandbox import wine
+from orchestrator.devices.sandbox.compiled_programs import host_path, proxy_path
 from orchestrator.devices.sandbox.mailbox import DIED, HUNG, Client, mailbox_library
 
-_HERE = Path(__file__).parent
-_BOTH = (_HERE / "mailbox.c", _HERE / "wine_talk.c")
 _WRITABLE = 0x80000000  # IMAGE_SCN_MEM_WRITE
 LOAD, SYMBOL, CALL, READ, WRITE, ALLOCATE = range(6)
 
@@ -46,29 +43,6 @@ _idle: list[tuple[Path, "subprocess.Popen[bytes]"]] = []
 
 class WineEndedError(LibraryEndedError):
     """The program under Wine has ended."""
-
-
-@cache
-def proxy_path() -> Path:
-    """The compiled functions of FMI 2.0 that ask the program under Wine."""
-    return compile_here(*_BOTH, _HERE / "wine_proxy.c")
-
-
-@cache
-def host_path() -> Path:
-    source = "#define UNDER_WINE\n" + joined_source(*_BOTH, _HERE / "wine_host.c")
-    return compile_for(source, TARGETS[wine.PLATFORM][0], ".exe")
-
-
-def compile_programs() -> list[Path]:
-    try:
-        wine.find_wine()
-        mailbox_library()
-        return [proxy_path(), host_path()]
-    except (OSError, RuntimeError) as error:
-        raise InputError(
-            f"libraries for Windows run under Wine, by a compiled program: {error}"
-        ) from error
 
 
 @cache
