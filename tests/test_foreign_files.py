@@ -128,6 +128,7 @@ OWN = {
     "devices.acceptance.runner": "is_file before it",
     "devices.acceptance.worker": "/proc",
     "face.api.saved": "results",
+    "face.cli.completion": "the tables of our own cases",
     "cases.form.definition": "is_file before it",
     "cases.networks.psse.dyr_model_list": "our own table",
     "devices.acceptance.controller_dll.file_head": "is_file before it",

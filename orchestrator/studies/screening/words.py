@@ -38,10 +38,22 @@ class OutageRow:
         return self.worst is not None and self.worst.record.stable is False
 
 
-def _rank(item: ScreenedItem) -> tuple[bool, float]:
-    """Return a key that puts unstable items first, and then those with the least damping."""
+def _rank(item: ScreenedItem) -> tuple[bool, float, float]:
+    """Return a key that puts unstable items first, the fastest growth first, and then those with the least damping.
+
+    Growth beside the critical modes counts as well: a voltage that runs away has no damping ratio."""
     least = least_of(item)
-    return item.record.stable is not False, least.damping if least else np.inf
+    damping = least.damping if least else np.inf
+    if item.record.stable is not False:
+        return True, 0.0, damping
+    return False, -_fastest_growth(item.record), damping
+
+
+def _fastest_growth(record: ItemRecord) -> float:
+    """Return the growth [1/s] of what grows fastest; 0 where growing eigenvalues were only counted."""
+    known = [float(value) for value in record.eigenvalues.real]
+    known += [record.fastest[0]] if record.fastest is not None else []
+    return max([0.0, *known])
 
 
 def by_outage(summary: Summary) -> list[OutageRow]:
@@ -55,14 +67,13 @@ def by_outage(summary: Summary) -> list[OutageRow]:
         least = None if worst is None else least_of(worst)
         unjudged = tuple(item for item in items if item.record.status is not Status.COMPUTED)
         rows.append(OutageRow(name, worst, least, unjudged, len(items)))
-    return sorted(
-        rows,
-        key=lambda row: (
-            not row.unstable,
-            not (row.unstable or row.unjudged),
-            row.least.damping if row.least else np.inf,
-        ),
-    )
+    return sorted(rows, key=_rank_of_row)
+
+
+def _rank_of_row(row: OutageRow) -> tuple[bool, bool, float, float]:
+    """Return a key that puts unstable outages first, then those with points that were not judged."""
+    _, growth, damping = _rank(row.worst) if row.worst else (True, 0.0, np.inf)
+    return not row.unstable, not (row.unstable or row.unjudged), growth, damping
 
 
 def load_of(plan: ScreeningPlan, point: OperatingCase) -> float:
@@ -164,8 +175,7 @@ def verdict_sentence(summary: Summary) -> str:
 def verdict_of(summary: Summary) -> VerdictSentence:
     total, planned = len(summary.result.items), summary.result.plan.number_of_items
     if summary.unstable:
-        growing = (one.item for one in summary.least_damped() if one.item.record.stable is False)
-        worst = next(growing, summary.unstable[0])
+        worst = min(summary.unstable, key=_rank)
         told = (not_judged(summary), runs_sentence(summary), summary.beyond)
         lost = "".join(f"; {text}" for text in told if text)
         at = f"at {counted_items(len(summary.unstable), total, planned)}; worst: {where(summary, worst)}"

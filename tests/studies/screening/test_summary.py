@@ -83,6 +83,7 @@ def test_units_beyond_their_limits_are_counted_where_the_item_was_judged():
         item.point, item.outage = SimpleNamespace(name="noon"), SimpleNamespace(name="line")
         item.record.beyond, item.record.reactive = {"a": load} if load else {}, ""
     found.result.items[2].record.status = Status.STEADY_STATE
+    found.result.plan = SimpleNamespace(points=("noon", "night"))
     assert (
         found.beyond
         == "at 1 of 2 judged a unit is beyond its rating, most a with 104 % (noon, line)"

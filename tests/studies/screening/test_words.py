@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,7 +19,12 @@ from orchestrator.studies.screening.request import ScreeningRequest
 from orchestrator.studies.screening.study import plan_screening, run_screening
 from orchestrator.studies.screening.summary import Summary
 from orchestrator.studies.screening.view import as_json, remarks
-from orchestrator.studies.screening.words import growth_outside, verdict_sentence, what_was_counted
+from orchestrator.studies.screening.words import (
+    by_outage,
+    growth_outside,
+    verdict_sentence,
+    what_was_counted,
+)
 
 
 @pytest.mark.parametrize(
@@ -196,3 +202,28 @@ def test_the_head_says_of_which_system_the_modes_are(screened, steps, said):
     )
     assert screened.plan.prepared.step_size == 1e-4
     assert said in what_was_counted(Summary(replace(screened, items=items)))
+
+
+def test_of_outages_that_grow_the_one_that_grows_fastest_is_the_worst():
+    """A voltage that runs away within seconds has no damping ratio; the swing that is shown beside it hardly grows."""
+
+    def item(outage, eigenvalues, stable=False, fastest=None):
+        record = ItemRecord(
+            Status.COMPUTED,
+            eigenvalues=np.array(eigenvalues),
+            critical=(0,),
+            stable=stable,
+            growing_elsewhere=int(fastest is not None),
+            fastest=fastest,
+            shares={"sg1": np.ones(len(eigenvalues), dtype=np.float32)},
+        )
+        return SimpleNamespace(record=record, outage=SimpleNamespace(name=outage, elements=()))
+
+    items = (
+        item("intact", [-0.001 + 9j], stable=True),
+        item("line_1", [0.04 + 7j]),
+        item("line_2", [-0.5 + 7j], fastest=(0.11, 0.0)),
+        item("line_3", [-2 + 8j], stable=True),
+    )
+    order = [row.name for row in by_outage(SimpleNamespace(result=SimpleNamespace(items=items)))]
+    assert order == ["line_2", "line_1", "intact", "line_3"]
