@@ -19,23 +19,7 @@ from orchestrator.cases import built_in
 from orchestrator.face.cli import main as gfor
 
 BUILT_IN = Path(built_in.__file__).parent / "ieee39"
-BUSES = (
-    1,
-    2,
-    3,
-    4,
-    6,
-    8,
-    9,
-    12,
-    14,
-    16,
-    19,
-    21,
-    23,
-    26,
-    29,
-)  # of 29 that are no machine's terminal
+BUSES = tuple(range(1, 30))  # those that are no machine's terminal
 RANGE = "0.4:1.6"  # where the machines swing [Hz]
 RATING = 500.0  # of the converter [MVA]
 GAINS = "0,100,200"  # of its POD-P [pu]

@@ -195,7 +195,7 @@ def _start(x: Figures) -> str:
 
 
 def _read_otherwise(x: Figures) -> str:
-    given = " ".join(f"--channel '{one}'" for one in x["remedy"])
+    given = " ".join(Option.CHANNEL + f" '{one}'" for one in x["remedy"])
     return (
         f"{x['reading']}? Read so, the error falls from {x['error']:.3g} to {x['left']:.3g} pu (rms). If it is so, "
         f"give {given}"
@@ -205,7 +205,9 @@ def _read_otherwise(x: Figures) -> str:
 def _stuck(x: Figures) -> str:
     return (
         f"{x['column']!r} is {x['value']:.4g} in all {x['count']} samples, which no instrument measures: was it "
-        f"recorded at all? Give the column that holds it, as in --channel '{x['role']}=COLUMN'"
+        f"recorded at all? Give the column that holds it, as in "
+        + Option.CHANNEL
+        + f" '{x['role']}=COLUMN'"
     )
 
 
