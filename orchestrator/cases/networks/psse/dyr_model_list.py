@@ -1,4 +1,4 @@
-"""The list that `gfor new --list-models` prints: what each record becomes, by which source, and what is left out.
+"""The list that `gfor new --models` prints: what each record becomes, by which source, and what is left out.
 
 The records themselves, with their fields: `dyr_unit_records`, and beside each model."""
 
