@@ -69,7 +69,7 @@ def explain_errors(
     ``in_step``: the events up to where the device falls out of step, where it does. If nothing explains most of the
     error, causes are tried while the device is held in step. Of long recordings the first seconds of the events with
     the largest errors are looked at. Ctrl-C leaves the causes that were found until then."""
-    found = _search(device, in_step or events, report)
+    found = _search(device, in_step or events, report, far=in_step is None)
     enough = found.explains and found.causes[0].left <= _MUCH * _movement(events)
     if enough or not found.finished or not _misses_much(device, events):
         return found
@@ -111,12 +111,16 @@ def _search(
     events: Sequence[RecordedEvent],
     report: Report,
     most: float = float("inf"),
+    far: bool = True,
 ) -> CauseSearch:
-    """Search all causes; ``most``: rms error that counts as the device's own at most [pu of the rating]."""
+    """Search all causes; ``most``: rms error that counts as the device's own at most [pu of the rating].
+
+    ``far``: whether numbers are tried far from where they are as well. Before a model falls out of step little can be
+    told of them, and the search that holds it in step follows."""
     found: list[Explanation] = []
     finished = True
     try:
-        for one in _causes(device, events, report):
+        for one in _causes(device, events, report, far):
             found.append(replace(one, error=min(one.error, most)))
     except KeyboardInterrupt:
         finished = False
@@ -125,7 +129,7 @@ def _search(
 
 
 def _causes(
-    device: PlayedDevice, events: Sequence[RecordedEvent], report: Report
+    device: PlayedDevice, events: Sequence[RecordedEvent], report: Report, far: bool
 ) -> Iterator[Explanation]:
     """Causes as they are found, the quickest first.
 
@@ -152,7 +156,7 @@ def _causes(
     if not told and device.gives_way:
         yield from seen(levels_of_limits(bench, rough))
     enough = explained if device.gives_way else told
-    if not enough and bench.misses:
+    if far and not enough and bench.misses:
         yield from numbers_by_factors(bench, rough, promises)
 
 
