@@ -17,8 +17,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fmus.toolchain.temporary import sweep
+from fmus.toolchain.temporary import remove, sweep
 from orchestrator.core.errors import ComponentError, InputError, NotFiniteError, RunInterruptedError
+from orchestrator.devices.fmi import unpacked
 from orchestrator.simulation.federation import federation as processes
 from orchestrator.simulation.federation import frames
 from orchestrator.simulation.federation.choice import Federates
@@ -72,11 +73,15 @@ def prepared(tmp_path):
 
 @pytest.fixture
 def temporary(tmp_path, monkeypatch):
-    """Where temporary folders are made; it must be empty in the end."""
+    """Where temporary folders are made; in the end it holds what this process keeps of our FMUs, and nothing else."""
     folder = tmp_path / "temporary"
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    monkeypatch.setattr(unpacked, "_folders", {})
     yield folder
+    for kept in unpacked._folders.values():
+        assert kept.users == 0
+        remove(kept.path)
     assert list(folder.iterdir()) == []
 
 

@@ -185,7 +185,16 @@ def test_the_command_runs_within_a_tolerance_and_shows_the_steps_it_took(gfor, t
     }.items():
         out = tmp_path / name
         code, text, _ = gfor(
-            "run", "two_area_rms", "--scenario", "gfor", "--stop", "2", "--out", out, *options
+            "run",
+            "two_area_rms",
+            "--scenario",
+            "gfor",
+            "--stop",
+            "2",
+            "--details",
+            "--out",
+            out,
+            *options,
         )
         assert code == 0
         with xr.open_dataset(out / "gfor" / "trajectory.nc") as data:
