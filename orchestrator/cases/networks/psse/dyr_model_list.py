@@ -3,7 +3,7 @@
 The records themselves, with their fields: `dyr_unit_records`, and beside each model."""
 
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -70,73 +70,70 @@ class KnownRecord:
 def known_records() -> list[KnownRecord]:
     """All records, by kind in the order of the tables that hold them."""
     found = [
-        KnownRecord(
-            name,
-            _KINDS.get(record.kind, record.kind),
-            record.part,
-            _OF_LIMITERS if record.kind in LIMITERS else _LIBRARY,
-            "; ".join(_limits(record)),
-        )
-        for name, record in DYR_RECORDS.items()
-    ]
-    found += [
-        KnownRecord(name, record.kind, record.part, _REGFM, "; ".join(_limits(record)))
-        for name, record in REGFM_A1_RECORDS.items()
-    ]
-    found += [
-        KnownRecord(name, record.kind, record.part, _REGFM_B1, "; ".join(_limits(record)))
-        for name, record in REGFM_B1_RECORDS.items()
-    ]
-    found += [
-        KnownRecord(name, "device", record.part, _COMPENSATORS, "; ".join(_limits(record)))
-        for name, record in STATIC_VAR_RECORDS.items()
-    ]
-    found += [
-        KnownRecord(name, "load", "load_model", _LOADS, "an exponent other than 0, 1, 2 near v_0")
-        for name in LOAD_RECORDS
-    ]
-    found += [
-        KnownRecord(name, "machine", record.part, _INDUCTION, "; ".join(_limits(record)))
-        for name, record in INDUCTION_RECORDS.items()
-    ]
-    found += [
-        KnownRecord(name, "load", "load_model", _FREQUENCY, "r, s not used; no constant impedances")
-        for name in FREQUENCY_RECORDS
-    ]
-    found += [
-        KnownRecord(name, "load", MODEL_OF_MOTORS, _COMPOSITE, _LEFT_OUT)
-        for name in COMPOSITE_NAMES
-    ]
-    found += [
-        KnownRecord(name, "load", record.part, _MOTORS, "; ".join(_limits(record)))
-        for name, record in MOTOR_NAMES.items()
-    ]
-    found += [
-        KnownRecord(name, _KINDS[record.kind], record.part, _GENERIC, "; ".join(_of_plant(name)))
-        for name, record in PLANT_RECORDS.items()
-    ]
-    found.append(
-        KnownRecord(CONTROLLER, "plants of several units", CONTROLLER_RECORD.part, _OF_SEVERAL)
-    )
-    found += [
-        KnownRecord(name, "converter", record.part, _DISTRIBUTED[name], "; ".join(_limits(record)))
-        for name, record in DISTRIBUTED_RECORDS.items()
-    ]
-    found += [
-        KnownRecord(name, "device (DC line)", record.part, _DC_LINES, _of_line(record))
-        for name, record in DC_LINE_RECORDS.items()
-    ]
-    found += [
-        KnownRecord(name, "relay", "unit_trip", _RELAYS, _OF_BUS if name in OF_BUSES else "")
-        for name in NUMBERED
-    ]
-    found += [
-        KnownRecord(name, "relay", "load_change", _RELAYS, _NOT_SHED)
-        for form in LOAD_RELAYS
-        for name in form.names
+        *_of_machines(),
+        *_of_table(REGFM_A1_RECORDS, _REGFM),
+        *_of_table(REGFM_B1_RECORDS, _REGFM_B1),
+        *_of_table(STATIC_VAR_RECORDS, _COMPENSATORS, "device"),
+        *_of_names(LOAD_RECORDS, _LOADS, "an exponent other than 0, 1, 2 near v_0"),
+        *_of_table(INDUCTION_RECORDS, _INDUCTION, "machine"),
+        *_of_names(FREQUENCY_RECORDS, _FREQUENCY, "r, s not used; no constant impedances"),
+        *_of_names(COMPOSITE_NAMES, _COMPOSITE, _LEFT_OUT, MODEL_OF_MOTORS),
+        *_of_table(MOTOR_NAMES, _MOTORS, "load"),
+        *_of_plants(),
+        KnownRecord(CONTROLLER, "plants of several units", CONTROLLER_RECORD.part, _OF_SEVERAL),
+        *_of_distributed(),
+        *_of_lines(),
+        *_of_relays(),
     ]
     by_name = _peers()
     return [replace(r, held_against=by_name.get(r.name, _BY_HAND)) for r in found]
+
+
+def _of_table(
+    records: Mapping[str, DyrRecord], source: str, kind: str | None = None
+) -> Iterator[KnownRecord]:
+    """Yield the records of a table with one source; ``kind``: where it is not the record's own."""
+    for name, record in records.items():
+        yield KnownRecord(name, kind or record.kind, record.part, source, _limits(record))
+
+
+def _of_names(
+    names: Iterable[str], source: str, approximated: str, part: str = "load_model"
+) -> Iterator[KnownRecord]:
+    """Yield the records of loads that become one part with one approximation."""
+    for name in names:
+        yield KnownRecord(name, "load", part, source, approximated)
+
+
+def _of_machines() -> Iterator[KnownRecord]:
+    for name, record in DYR_RECORDS.items():
+        kind = _KINDS.get(record.kind, record.kind)
+        source = _OF_LIMITERS if record.kind in LIMITERS else _LIBRARY
+        yield KnownRecord(name, kind, record.part, source, _limits(record))
+
+
+def _of_plants() -> Iterator[KnownRecord]:
+    for name, record in PLANT_RECORDS.items():
+        yield KnownRecord(name, _KINDS[record.kind], record.part, _GENERIC, _of_plant(name))
+
+
+def _of_distributed() -> Iterator[KnownRecord]:
+    for name, record in DISTRIBUTED_RECORDS.items():
+        yield KnownRecord(name, "converter", record.part, _DISTRIBUTED[name], _limits(record))
+
+
+def _of_lines() -> Iterator[KnownRecord]:
+    for name, record in DC_LINE_RECORDS.items():
+        yield KnownRecord(name, "device (DC line)", record.part, _DC_LINES, _of_line(record))
+
+
+def _of_relays() -> Iterator[KnownRecord]:
+    for name in NUMBERED:
+        approximated = _OF_BUS if name in OF_BUSES else ""
+        yield KnownRecord(name, "relay", "unit_trip", _RELAYS, approximated)
+    for form in LOAD_RELAYS:
+        for name in form.names:
+            yield KnownRecord(name, "relay", "load_change", _RELAYS, _NOT_SHED)
 
 
 _BY_HAND = "its diagram's equations, by hand"
@@ -144,7 +141,7 @@ _BY_HAND = "its diagram's equations, by hand"
 
 def _of_line(record: DyrRecord) -> str:
     """Return what is approximated of a DC line, and which of its interruptions are left out."""
-    return "; ".join((_OF_LINE, *_limits(record)))
+    return _together(_OF_LINE, _limits(record))
 
 
 def _peers() -> dict[str, str]:
@@ -168,15 +165,24 @@ _KINDS = {
 """Words for the kinds of limiters and of a plant's records."""
 
 
-def _of_plant(name: str) -> Iterator[str]:
-    """Yield what is approximated of a plant's record, and what stands for it at the user's word."""
-    yield from _limits(PLANT_RECORDS[name])
-    if name in FIELDS:
-        yield f"with dyr_approximate = true: {MODEL}"
+def _of_plant(name: str) -> str:
+    """Return what is approximated of a plant's record, and what stands for it at the user's word."""
+    by_word = f"with dyr_approximate = true: {MODEL}" if name in FIELDS else ""
+    return _together(_limits(PLANT_RECORDS[name]), by_word)
 
 
-def _limits(record: DyrRecord) -> Iterator[str]:
+def _together(*parts: str) -> str:
+    return "; ".join(part for part in parts if part)
+
+
+def _limits(record: DyrRecord) -> str:
     """Return what a part of ours cannot take of a record, and what it does not use."""
+    unused = _unused(record)
+    not_used = f"{', '.join(unused)} not used" if unused else ""
+    return _together(*_limited_fields(record), not_used)
+
+
+def _limited_fields(record: DyrRecord) -> Iterator[str]:
     for field in record.fields:
         if field.bus_of:
             yield f"{field.name} only the machine's own"
@@ -184,8 +190,12 @@ def _limits(record: DyrRecord) -> Iterator[str]:
             yield f"{field.name} only {' or '.join(f'{value:g}' for value in field.only)}"
         if field.same_as:
             yield f"{field.name} only as {field.same_as}"
+
+
+def _unused(record: DyrRecord) -> list[str]:
+    """Return the fields that nothing of ours takes."""
     used = {name for f in record.fields for name in (f.times, f.same_as, f.nothing_without) if name}
-    unused = [
+    return [
         f.name
         for f in record.fields
         if not (
@@ -199,5 +209,3 @@ def _limits(record: DyrRecord) -> Iterator[str]:
             or f.name in used
         )
     ]
-    if unused:
-        yield f"{', '.join(unused)} not used"
