@@ -6,6 +6,9 @@ from typing import Any, TypeVar
 
 Told = TypeVar("Told")
 _FIGURE = re.compile(r"[-+]?\b\d[\d.,]*(?:e[-+]?\d+)?")
+LONGEST_REMARK = 120
+"""Characters of a remark in a table; JSON and Python have the whole text."""
+
 _ITEMS_SHOWN = 5  # how many of a long list are shown, largest first
 
 

@@ -64,7 +64,7 @@ def _element(text: str, elements: Elements) -> str:
     if end is None:
         hint = close_names(text, elements.names, f"write {', '.join(_KINDS)}, or names of elements")
         raise InputError(
-            Option.OUTAGES + f": there is no unit, line, load or shunt {text!r}; {hint}"
+            Option.OUTAGES + f": there is no unit, line, DC line, load or shunt {text!r}; {hint}"
         )
     return end.element
 

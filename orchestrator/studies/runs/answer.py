@@ -7,9 +7,6 @@ from typing import Any
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.output.results.mode_json import eigenvalue_json
 
-LONGEST_REMARK = 120
-"""Characters of a remark in a table; the whole text stands among the details."""
-
 _SMALLEST = 1e-4
 """Share of a mode from which on a component is named in files."""
 
@@ -20,7 +17,7 @@ class ScenarioAnswer:
     good: bool | None  # whether that is good; None where it is not known
     verdict: str
     mode: Mode | None  # the least damped mode of the range
-    remark: str
+    remark: str  # whole; tables shorten it
     # the least damped mode where the events leave something switched, and who swings in it
     after: Mode | None = None
     after_swing: str = ""

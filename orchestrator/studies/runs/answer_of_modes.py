@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.linear.spectra.stability import Cause
-from orchestrator.output.report.short_texts import first_few, short
+from orchestrator.output.report.short_texts import first_few
 from orchestrator.studies.modes.modes import ModesResult
-from orchestrator.studies.runs.answer import LONGEST_REMARK, ScenarioAnswer
+from orchestrator.studies.runs.answer import ScenarioAnswer
 
 
 def of_modes(result: ModesResult) -> ScenarioAnswer:
@@ -82,7 +82,7 @@ def with_misfits(result: ModesResult, remark: str) -> str:
     faults = [
         f"{name}: {', '.join(m.fault for m in found)}" for name, found in result.misfits.items()
     ]
-    return short("; ".join([*faults, remark] if remark else faults), LONGEST_REMARK)
+    return "; ".join([*faults, remark] if remark else faults)
 
 
 def swing_of(result: ModesResult, mode: Mode) -> str:

@@ -8,13 +8,12 @@ from math import ceil
 from orchestrator.core.errors import RunInterruptedError, few
 from orchestrator.core.options import Option
 from orchestrator.linear.spectra.modes import Mode
-from orchestrator.output.report.short_texts import short
 from orchestrator.simulation.watch.confirmation import PERIODS
 from orchestrator.simulation.watch.finding import INTERRUPTION, LIMIT, STALL, TRIP, Finding, Kind
 from orchestrator.simulation.watch.own_trips import OWN_TRIPS
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.runs.after_events import lasting_changes, same_mode
-from orchestrator.studies.runs.answer import LONGEST_REMARK, ScenarioAnswer
+from orchestrator.studies.runs.answer import ScenarioAnswer
 from orchestrator.studies.runs.answer_of_modes import (
     least_damped,
     of_modes,
@@ -67,7 +66,7 @@ def _with_limits(answer: ScenarioAnswer, result: RunResult) -> ScenarioAnswer:
     told = [f"the {what} of {few(names, _TRIPS_NAMED)}" for what, names in acting.items()]
     acts = "acts" if len(told) == 1 and len(next(iter(acting.values()))) == 1 else "act"
     remark = f"{few(told, 1)} {acts} at the end, and modes are those without it"
-    return replace(answer, remark=short("; ".join([remark, answer.remark]), LONGEST_REMARK))
+    return replace(answer, remark="; ".join(filter(None, [remark, answer.remark])))
 
 
 def _with_trips(answer: ScenarioAnswer, result: RunResult) -> ScenarioAnswer:
@@ -89,7 +88,7 @@ def _with_trips(answer: ScenarioAnswer, result: RunResult) -> ScenarioAnswer:
     ]
     if not told:
         return answer
-    return replace(answer, remark=short("; ".join([*told, answer.remark]), LONGEST_REMARK))
+    return replace(answer, remark="; ".join(filter(None, [*told, answer.remark])))
 
 
 def _of_kind(result: RunResult, kind: Kind) -> list[Finding]:
@@ -114,7 +113,7 @@ def _of_run(result: RunResult) -> ScenarioAnswer:
             answer = replace(answer, remark=f"{answer.remark}; {told}")
         return _with_after(answer, result.modes, after, swing)
     if left.good is False and answer.good is not False:
-        remark = short(f"the system that the events leave: {left.remark}", LONGEST_REMARK)
+        remark = f"the system that the events leave: {left.remark}"
         answer = replace(answer, good=False, verdict="UNSTABLE", remark=remark)
     return _with_after(answer, result.modes, after, left.mode)
 
@@ -158,8 +157,7 @@ class _Response:
         return ", ".join(f"{time:g} s" for time in self.result.modes.prepared.not_reached)
 
     def answer(self, good: bool | None, verdict: str, remark: str) -> ScenarioAnswer:
-        text = short(remark, LONGEST_REMARK)
-        return ScenarioAnswer(self.by_modes.subject, good, verdict, self.by_modes.mode, text)
+        return ScenarioAnswer(self.by_modes.subject, good, verdict, self.by_modes.mode, remark)
 
     def not_known(self, remark: str) -> ScenarioAnswer:
         return self.answer(None, "not known", remark)

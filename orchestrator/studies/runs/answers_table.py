@@ -8,10 +8,10 @@ from rich.text import Text
 
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.output.report.colours import OF_VERDICTS
-from orchestrator.output.report.short_texts import short
+from orchestrator.output.report.short_texts import LONGEST_REMARK, short
 from orchestrator.output.report.terminal_tables import make_table
 from orchestrator.studies.modes.modes import ModesResult
-from orchestrator.studies.runs.answer import LONGEST_REMARK, ScenarioAnswer
+from orchestrator.studies.runs.answer import ScenarioAnswer
 from orchestrator.studies.runs.answer_of_modes import name_of_answers
 
 
@@ -58,7 +58,7 @@ def answers_table(
         word = Text(answer.verdict, style=f"bold {OF_VERDICTS[answer.good]}")
         modes = [mode for mode in (answer.mode, answer.became) if mode]
         figures = _figures(modes, theirs.get(k))
-        table.add_row(answer.subject, word, *figures, answer.remark)
+        table.add_row(answer.subject, word, *figures, short(answer.remark, LONGEST_REMARK))
         another = answer.another_after
         if another:
             which = "another mode" if answer.became else "not clearly the same mode"

@@ -11,9 +11,11 @@ from orchestrator.cases.form.schema import KindTable
 from orchestrator.face.cli import main
 from orchestrator.linear.spectra.modes import make_mode
 from orchestrator.linear.spectra.stability import Stability
+from orchestrator.output.report.short_texts import LONGEST_REMARK
 from orchestrator.simulation.watch.finding import Finding
 from orchestrator.studies.runs.answer_of_modes import of_modes
 from orchestrator.studies.runs.answer_of_run import of_run
+from orchestrator.studies.runs.answers_table import answers_table
 from orchestrator.studies.runs.run import RunResult
 from tests.support.scenarios import bare_scenario
 
@@ -106,6 +108,17 @@ def test_the_verdict_of_a_run_is_its_own(findings, stable, word, remark):
         assert of_run(result(findings, stable, kind="phasor")).remark.endswith(
             "repeat with --set models=emt"
         )
+
+
+def test_a_long_remark_is_whole_in_json_and_short_in_the_table():
+    acting = [finding("active_limit", what=f"limit of the current number {k}") for k in range(4)]
+    answer = of_run(result(acting))
+    assert len(answer.remark) > LONGEST_REMARK
+    assert answer.as_json()["remark"] == answer.remark
+    assert answer.remark.endswith("sg1 against sg2")
+    cut = str(next(iter(answers_table([answer], (0.1, 2.0)).columns[-1].cells)))
+    assert cut.endswith(" …")
+    assert answer.remark.startswith(cut.removesuffix(" …"))
 
 
 @pytest.mark.parametrize(

@@ -117,8 +117,8 @@ def test_in_a_run_the_end_opens_after_a_fault_at_its_own_bus(tmp_path, monkeypat
     ("text", "words"),
     [
         ("l31 at b2", "l31 joins b3 and b1; write 'l31 at b3' or 'l31 at b1'"),
-        ("l13 at b3", "there is no unit, line, load or shunt 'l13 at b3'"),
-        ("town at b3", "there is no unit, line, load or shunt 'town at b3'"),
+        ("l13 at b3", "there is no unit, line, DC line, load or shunt 'l13 at b3'"),
+        ("town at b3", "there is no unit, line, DC line, load or shunt 'town at b3'"),
         ("l31 at b3,l31 at b3", "l31 at b3 is named twice"),
     ],
 )

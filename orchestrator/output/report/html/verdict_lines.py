@@ -10,6 +10,7 @@ from typing import Any
 from orchestrator.core.errors import few
 from orchestrator.output.report.html.elements import SHADES, VERDICTS, damping, number, table
 from orchestrator.output.report.html.least_damped import LeastDamped
+from orchestrator.output.report.short_texts import LONGEST_REMARK, short
 
 _WORST_FIRST: Mapping[bool | None, int] = {False: 0, None: 1, True: 2}
 
@@ -47,7 +48,7 @@ class VerdictLine:
             scenario=scenario.get("subject") or scenario.get("title", scenario["name"]),
             stable=stable,
             verdict=answer.get("verdict") or VERDICTS[stable],
-            remark=answer.get("remark") or "",
+            remark=short(answer.get("remark") or "", LONGEST_REMARK),
             least=_mode(least),
             after=_mode(answer.get("after_events")),
             in_time=_mode(scenario.get("ring_down")),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from orchestrator.core.errors import CaseError
+from orchestrator.core.errors import CaseError, InputError
 from orchestrator.linear.models.coupled_state import CoupledState
 from orchestrator.linear.models.linear_model import HELD
 from orchestrator.linear.models.linearization import Blocks, compose, continuous
@@ -340,6 +340,11 @@ def test_a_dc_line_is_lost_by_the_name_that_its_file_gives_it(prepared):
     _, named = read_outages("tie 1", elements)
     _, station = read_outages(RECTIFIER, elements)
     assert named == station
+
+
+def test_an_unknown_outage_is_told_that_dc_lines_count(prepared):
+    with pytest.raises(InputError, match="no unit, line, DC line, load or shunt 'DCB'"):
+        read_outages("DCB", Elements.of(prepared()))
 
 
 def test_ends_that_do_not_fit_are_refused(prepared):
