@@ -6,7 +6,11 @@ from dataclasses import dataclass, replace
 from orchestrator.cases.draft import Draft, UnitOrigin
 from orchestrator.cases.form.schema import ComponentTable, UnitsTable
 from orchestrator.cases.networks.load_models import is_open
-from orchestrator.cases.networks.psse.composite_loads import composite_loads, composite_remarks
+from orchestrator.cases.networks.psse.composite_loads import (
+    CompositeLoads,
+    composite_loads,
+    composite_remarks,
+)
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.load_records import with_recorded_laws
 from orchestrator.cases.networks.psse.motor_loads import (
@@ -15,6 +19,7 @@ from orchestrator.cases.networks.psse.motor_loads import (
     motor_loads,
     motor_remarks,
 )
+from orchestrator.cases.networks.psse.refusals import Refusals
 
 _PHASOR = "_phasor"  # end of the names of phasor models, which motors are alone
 _COMMON = "converter_parameters"  # key of [units] with values of units, of which a motor takes none
@@ -37,10 +42,14 @@ def take_motors(draft: Draft, table: UnitsTable, records: Sequence[DynamicRecord
         return Motors()
     left = {name.upper() for name in table.dyr_leave_out}
     wanted = [record for record in records if record.name not in left]
-    motors = motor_loads(wanted, data.file_loads, data.loads)
+    motors, composite, refusals = list[MotorLoad](), CompositeLoads((), {}, ()), Refusals()
+    with refusals.keep():
+        motors = motor_loads(wanted, data.file_loads, data.loads)
     alone = [motor.load for motor in motors]
     rest = [load for load in data.file_loads if load not in alone]
-    composite = composite_loads(wanted, rest, data.loads)
+    with refusals.keep():
+        composite = composite_loads(wanted, rest, data.loads)
+    refusals.tell()
     if not motors and not composite.records:
         return Motors()
     load_mw = sum(load.p_mw for load in data.loads if load.p_mw > 0)

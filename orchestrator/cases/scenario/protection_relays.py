@@ -1,7 +1,7 @@
 """Relays of a scenario: which records of a DYR file have one here, and what it orders in a run."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 from fmus.grid.network import Network
@@ -16,6 +16,7 @@ from orchestrator.cases.networks.psse.load_relay_records import (
     load_relays,
 )
 from orchestrator.cases.networks.psse.raw_network import unit_labels
+from orchestrator.cases.networks.psse.refusals import Refusals
 from orchestrator.cases.networks.psse.relay_records import UnitRelay, unit_relays
 from orchestrator.cases.networks.step_ups import shared_branches
 from orchestrator.cases.scenario.measured_points import line_of_numbers
@@ -44,8 +45,8 @@ Place = tuple[str, int]
 class TakenRelays:
     """Places of the records that a relay stands for, and why others of relays have none."""
 
-    places: frozenset[Place]
-    unused: Mapping[Place, str]
+    places: frozenset[Place] = frozenset()
+    unused: Mapping[Place, str] = field(default_factory=dict)
 
 
 def take_relays(draft: Draft, records: Sequence[DynamicRecord]) -> TakenRelays:
@@ -54,9 +55,15 @@ def take_relays(draft: Draft, records: Sequence[DynamicRecord]) -> TakenRelays:
     if data is None:
         return TakenRelays(frozenset(), {})
     labels = unit_labels(data.machines)
+    refusals, of_units, stages = Refusals(), list[UnitRelay](), list[LoadRelay]()
+    with refusals.keep():
+        of_units = unit_relays(records)
+    with refusals.keep():
+        stages = load_relays(records, data.file_loads)
+    refusals.tell()
     taken: list[tuple[str, UnitRelay]] = []
     unused: dict[Place, str] = {}
-    for relay in unit_relays(records):
+    for relay in of_units:
         bus, name = relay.machine
         label = labels.get(relay.machine)
         if relay.machine in data.idle_machines:
@@ -75,7 +82,7 @@ def take_relays(draft: Draft, records: Sequence[DynamicRecord]) -> TakenRelays:
     loads = {load.name for load in data.loads}
     of_loads = [
         relay
-        for relay in load_relays(records, data.file_loads)
+        for relay in stages
         if relay.load.load in loads and bus_name(str(relay.watched)) in data.buses
     ]
     draft.unit_relays, draft.load_relays = taken, of_loads

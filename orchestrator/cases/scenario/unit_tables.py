@@ -38,6 +38,7 @@ from orchestrator.cases.networks.psse.dyr_units import (
 )
 from orchestrator.cases.networks.psse.dyr_uses import record_uses
 from orchestrator.cases.networks.psse.motor_loads import MotorLoad
+from orchestrator.cases.networks.psse.refusals import Refusals
 from orchestrator.cases.networks.psse.unused_models import unused_models
 from orchestrator.cases.networks.record_use import UseOfRecord
 from orchestrator.cases.networks.source_changes import Changes, Remark, kind_of
@@ -45,9 +46,9 @@ from orchestrator.cases.networks.source_ratings import with_needed_ratings
 from orchestrator.cases.networks.unit_row import UnitRow, checked
 from orchestrator.cases.questions.plausibility import question
 from orchestrator.cases.scenario.dc_lines import dc_components, take_dc_lines
-from orchestrator.cases.scenario.motor_components import motor_components, take_motors
+from orchestrator.cases.scenario.motor_components import Motors, motor_components, take_motors
 from orchestrator.cases.scenario.plants_of_several import plant_components, take_plants
-from orchestrator.cases.scenario.protection_relays import take_relays
+from orchestrator.cases.scenario.protection_relays import TakenRelays, take_relays
 from orchestrator.cases.scenario.recorded_loads import take_frequency, take_laws
 from orchestrator.cases.scenario.removed_parts import without_removed_parts
 from orchestrator.core.errors import InputError, Problem, few
@@ -296,18 +297,20 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> tuple[list[UnitRow], Sequen
     records = at_their_devices(read_dyr(path), machines)
     keys = [(machine.bus, machine.name.strip()) for machine in machines]
     ours = {key for key, row in zip(keys, rows, strict=True) if row.label in table.replace}
-    rows = with_records(
-        rows,
-        machines,
-        [record for record in records if (record.bus, record.machine) not in ours],
-        table.dyr_leave_out,
-        replaced,
-        idle,
-        approximate=table.dyr_approximate,
-    )
+    refusals = Refusals()
+    with refusals.keep():
+        rows = with_records(
+            rows,
+            machines,
+            [record for record in records if (record.bus, record.machine) not in ours],
+            table.dyr_leave_out,
+            replaced,
+            idle,
+            approximate=table.dyr_approximate,
+        )
     if draft.data is not None:
         rows = with_known_buses(rows, draft.data.merged, draft.data.buses)
-    motors = _account(draft, table, records, ours)
+    motors = _account(draft, table, records, ours, refusals)
     rows = with_choices(rows, replaced, chosen_parts(table))
     rows = without_idle_controls(rows, str(path), _choosing_exciters(draft, rows))
     rows = without_removed_parts(draft, rows)
@@ -381,10 +384,12 @@ def _account(
     table: UnitsTable,
     records: Sequence[DynamicRecord],
     ours: Collection[tuple[int, str]],
+    refusals: Refusals,
 ) -> Sequence[MotorLoad]:
     """Note what became of each record of a DYR file, and ask about those of no machine that could matter.
 
-    ``ours``: machines that a converter of the case replaces. Returns the loads that are motors."""
+    ``ours``: machines that a converter of the case replaces; ``refusals``: of the records of machines, which are told
+    with those of others. Returns the loads that are motors."""
     machines = draft.data.machines if draft.data else ()
     uses = record_uses(
         records,
@@ -395,13 +400,19 @@ def _account(
         exciter=table.exciter,
         ours=ours,
     )
-    motors = take_motors(draft, table, records)
     left = {name.upper() for name in table.dyr_leave_out}
     wanted = [record for record in records if record.name not in left]
-    taken = take_laws(draft, wanted) | take_frequency(draft, wanted)
-    taken |= motors.places | take_plants(draft, table, wanted, ours)
-    taken |= take_dc_lines(draft, table, wanted)
-    relays = take_relays(draft, wanted)
+    motors, relays, taken = Motors(), TakenRelays(), frozenset[tuple[str, int]]()
+    with refusals.keep():
+        motors = take_motors(draft, table, records)
+    taken |= take_laws(draft, wanted) | take_frequency(draft, wanted)
+    with refusals.keep():
+        taken |= motors.places | take_plants(draft, table, wanted, ours)
+    with refusals.keep():
+        taken |= take_dc_lines(draft, table, wanted)
+    with refusals.keep():
+        relays = take_relays(draft, wanted)
+    refusals.tell()
     taken |= relays.places
     uses = [
         replace(use, use=UseOfRecord.USED, why="", of_no_machine=False)

@@ -25,6 +25,7 @@ from orchestrator.cases.networks.psse.load_records import (
 )
 from orchestrator.cases.networks.psse.motor_loads import MotorLoad
 from orchestrator.cases.networks.psse.raw_network import FileLoad
+from orchestrator.cases.networks.psse.refusals import Refusals
 from orchestrator.core.errors import InputError, Problem, QuestionTopic, few, number_of
 
 COMPOSITE_NAMES = tuple(f"CMLD{subsystem}U2" for subsystem in SUBSYSTEMS)
@@ -59,17 +60,20 @@ def composite_loads(
     at_bus = Counter(load.bus for load in file_loads)
     motors: list[MotorLoad] = []
     rests: dict[str, list[tuple[FileLoad, float, RecordedLaw]]] = {}
-    used = []
+    used, refusals = list[DynamicRecord](), Refusals()
     for load in file_loads:
         record = next(records_for(load, records, COMPOSITE_NAMES), None)
         if record is None or load.load not in elements or not load.drawn.real > 0:
             continue
-        numbers = _numbers(record)
-        own = list(_motors(load, record, numbers, elements[load.load].bus, at_bus[load.bus] > 1))
-        motors += own
-        used.append(record)
-        left = 1 - sum(motor.drawn.real for motor in own) / load.drawn.real
-        rests.setdefault(load.load, []).append((load, left, _law(record, numbers, left)))
+        with refusals.keep():
+            numbers = _numbers(record)
+            bus = elements[load.load].bus
+            own = list(_motors(load, record, numbers, bus, at_bus[load.bus] > 1))
+            motors += own
+            used.append(record)
+            left = 1 - sum(motor.drawn.real for motor in own) / load.drawn.real
+            rests.setdefault(load.load, []).append((load, left, _law(record, numbers, left)))
+    refusals.tell()
     laws = {name: _law_of_all(elements[name], own) for name, own in rests.items()}
     return CompositeLoads(tuple(motors), laws, tuple(dict.fromkeys(used)))
 

@@ -16,6 +16,7 @@ from orchestrator.cases.networks.psse.device_flow import SolvedDevices
 from orchestrator.cases.networks.psse.devices import HeldDevice, Voltages
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, given_values
 from orchestrator.cases.networks.psse.dyr_values import values_of_record
+from orchestrator.cases.networks.psse.refusals import Refusals
 from orchestrator.cases.networks.psse.two_terminal import CURRENT, Pole, TwoTerminal
 from orchestrator.core.errors import InputError, Problem, QuestionTopic, few, number_of
 
@@ -123,18 +124,20 @@ def modelled_lines(
     Raises
     ------
     InputError
-        If a line has two records, or one has a value that cannot be.
+        If lines have two records, or one with a value that cannot be; with all of them.
     """
     by_name = {line.name: line for line in lines}
-    found: dict[str, ModelledLine] = {}
+    found, refusals = dict[str, ModelledLine](), Refusals()
     for record in records:
         line = by_name.get(record.line_of_dc)
         if record.name not in DC_LINE_RECORDS or line is None:
             continue
-        if line.name in found:
-            text = f"a second {record.name} of the DC line {line.name!r}; remove one of them"
-            raise InputError.at(record.place, text)
-        found[line.name] = _modelled(record, line)
+        with refusals.keep():
+            if line.name in found:
+                text = f"a second {record.name} of the DC line {line.name!r}; remove one of them"
+                raise InputError.at(record.place, text)
+            found[line.name] = _modelled(record, line)
+    refusals.tell()
     return [*found.values()]
 
 

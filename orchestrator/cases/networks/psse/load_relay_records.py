@@ -16,6 +16,7 @@ from math import inf
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.load_records import records_for
 from orchestrator.cases.networks.psse.raw_network import FileLoad
+from orchestrator.cases.networks.psse.refusals import Refusals
 from orchestrator.cases.networks.psse.relay_records import check_times, numbers_of
 from orchestrator.core.errors import InputError
 from orchestrator.systems.coupling.relay_limits import Quantity, RelayLimits
@@ -106,19 +107,23 @@ class LoadRelay:
     sheds_shunts: bool = False
 
 
-def load_relays(records: Sequence[DynamicRecord], loads: Sequence[FileLoad]) -> Iterator[LoadRelay]:
-    """Yield the stages of the relays of loads; of two records of one family the narrower counts.
+def load_relays(records: Sequence[DynamicRecord], loads: Sequence[FileLoad]) -> list[LoadRelay]:
+    """Return the stages of the relays of loads; of two records of one family the narrower counts.
 
     Raises
     ------
     InputError
-        If a record has not its values, or one that cannot be.
+        If records have not their values, or one that cannot be; with all of them.
     """
+    found, refusals = list[LoadRelay](), Refusals()
     for load in loads:
         for form in LOAD_RELAYS:
             record = next(records_for(load, records, form.names), None)
             if record is not None and load.p_mw > 0:
-                yield from _stages(record, load, form)
+                with refusals.keep():
+                    found += _stages(record, load, form)
+    refusals.tell()
+    return found
 
 
 def _stages(record: DynamicRecord, load: FileLoad, form: LoadRelayForm) -> Iterator[LoadRelay]:

@@ -16,6 +16,7 @@ from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, number_of_f
 from orchestrator.cases.networks.psse.dyr_values import values_of_record
 from orchestrator.cases.networks.psse.load_records import records_for
 from orchestrator.cases.networks.psse.raw_network import FileLoad
+from orchestrator.cases.networks.psse.refusals import Refusals
 from orchestrator.core.errors import InputError, Problem, QuestionTopic, few, number_of
 
 MOTOR_NAMES = {
@@ -64,11 +65,11 @@ def motor_loads(
     Raises
     ------
     InputError
-        If a record has a value that cannot be, or gives no rating.
+        If records have a value that cannot be, or give no rating; with all of them.
     """
     buses = {load.name: load.bus for load in loads}
     at_bus = Counter(load.bus for load in file_loads)
-    found = []
+    found, refusals = list[MotorLoad](), Refusals()
     for load in file_loads:
         record = _record_for(load, records)
         if record is None or load.load not in buses or not load.drawn.real > 0:
@@ -76,9 +77,12 @@ def motor_loads(
         own = f"_{_NO_LETTER.sub('_', load.name)}" if at_bus[load.bus] > 1 else ""
         known = MOTOR_NAMES[record.name]
         name = f"motor{load.bus}{own}"
-        parameters = _parameters(record, known, load)
         at = buses[load.load]
-        found.append(MotorLoad(name, at, known.part, parameters, load, record, drawn=load.drawn))
+        with refusals.keep():
+            own_values = _parameters(record, known, load)
+            motor = MotorLoad(name, at, known.part, own_values, load, record, drawn=load.drawn)
+            found.append(motor)
+    refusals.tell()
     return found
 
 

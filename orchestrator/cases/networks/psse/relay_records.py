@@ -8,11 +8,12 @@ its whole bus.
 
 Source: PowerWorld's guide to PSS/E's relay models; fields as InterPSS and GridPACK read them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 
 from orchestrator.cases.networks.psse.dyr_file import NUMBERED, DynamicRecord
+from orchestrator.cases.networks.psse.refusals import Refusals
 from orchestrator.core.errors import InputError
 from orchestrator.core.units import LARGEST
 from orchestrator.systems.coupling.relay_limits import Quantity, RelayLimits
@@ -39,17 +40,21 @@ class UnitRelay:
         return self.record.name in OF_BUSES
 
 
-def unit_relays(records: Sequence[DynamicRecord]) -> Iterator[UnitRelay]:
-    """Yield the relays of generators, whichever these are.
+def unit_relays(records: Sequence[DynamicRecord]) -> list[UnitRelay]:
+    """Return the relays of generators, whichever these are.
 
     Raises
     ------
     InputError
-        If a record has not its values, or one that cannot be.
+        If records have not their values, or one that cannot be; with all of them.
     """
+    found, refusals = list[UnitRelay](), Refusals()
     for record in records:
         if record.name in NUMBERED:
-            yield _unit_relay(record)
+            with refusals.keep():
+                found.append(_unit_relay(record))
+    refusals.tell()
+    return found
 
 
 def _unit_relay(record: DynamicRecord) -> UnitRelay:
