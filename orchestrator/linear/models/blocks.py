@@ -10,6 +10,7 @@ from orchestrator.core.errors import AnalysisError, InputError
 from orchestrator.core.spelling import for_python
 from orchestrator.linear.models.component_linearization import (
     ComponentLinearization,
+    linearize_alike,
     linearize_by_derivatives,
     linearize_component,
 )
@@ -115,11 +116,32 @@ class Blocks:
         self, master: Master, known: Mapping[str, ComponentLinearization]
     ) -> dict[str, ComponentLinearization]:
         """All components, those with most inputs last: by then it is known which of their inputs nothing moves."""
-        found: dict[str, ComponentLinearization] = {}
         self._idle: dict[str, frozenset[str]] = {}
+        found = self._linearized_alike(master, known)
         for name in sorted(master.exchanges, key=lambda name: _has_many_inputs(master, name)):
-            found[name] = known.get(name) or self._linearize_beside(master, name, found)
+            if name not in found:
+                found[name] = known.get(name) or self._linearize_beside(master, name, found)
         return {name: found[name] for name in master.exchanges}
+
+    def _linearized_alike(
+        self, master: Master, known: Collection[str]
+    ) -> dict[str, ComponentLinearization]:
+        """Components that are perturbed together with others alike; none where each is remembered by its state."""
+        step_size = self.step_size / self.parts
+        if self.directional or self._once or master.remembered is not None:
+            return {}
+        told = 0.0 if self._untold else step_size
+        together = [
+            exchange
+            for name, exchange in master.exchanges.items()
+            if not (name in known or self._driven[name] or self._observed[name])
+            and not _has_many_inputs(master, name)
+            and (told == master.clock.step_size or not knows_step(master, name))
+        ]
+        alike = linearize_alike(together, master.time, step_size, derivatives=self._derivatives)
+        found = {one.name: one for one in alike}
+        self._idle |= dict.fromkeys(found, frozenset())
+        return found
 
     def _linearize_beside(
         self, master: Master, name: str, others: Mapping[str, ComponentLinearization]

@@ -2,7 +2,7 @@
 
 Where an FMU gives directional derivatives, these give the same model in an independent way."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -18,12 +18,13 @@ from orchestrator.linear.models.differences import PerturbedStep
 from orchestrator.linear.models.held_inputs import over_held_inputs
 from orchestrator.linear.models.limits_close_by import without_curvature
 from orchestrator.linear.models.linear_model import DIRECTIONAL, PACKED, PERTURBED
-from orchestrator.linear.models.perturbation import perturb
+from orchestrator.linear.models.perturbation import PerturbationResult, perturb, perturb_alike
 from orchestrator.linear.models.response_check import ContinuousModel, check_response
 from orchestrator.linear.models.state_access import (
     StateAccess,
     check_operating_point,
     embedded_model,
+    obstacle,
 )
 from orchestrator.systems.coupling.turns import Exchange
 
@@ -95,9 +96,7 @@ def linearize_component(
     inside = embedded_model(component)
     if inside is not None:
         return _from_inside(exchange, inside, time, step_size, inputs, observed)
-    names = component.description.states
     rates = component.description.rates if derivatives else ()
-    n, p = len(names), len(exchange.outputs.names)
     entries = (*exchange.inputs.names, *inputs)
     exits = (*exchange.outputs.names, *observed)
     moved = [k for k, name in enumerate(entries) if name not in idle]
@@ -106,6 +105,57 @@ def linearize_component(
         rates,
         once=once,
     )
+    return _from_perturbation(exchange, found, entries, moved, observed, derivatives=derivatives)
+
+
+ALIKE = 64
+"""Components alike that are perturbed at once: what NumPy keeps of them stays in the processor's cache."""
+
+
+def linearize_alike(
+    exchanges: Iterable[Exchange], time: float, step_size: float, *, derivatives: bool = False
+) -> Iterator[ComponentLinearization]:
+    """`linearize_component` for many, with the same bits; components whose variables have the same names at once.
+
+    Those are left out that are the only ones of their kind, that cannot be perturbed, or that need a smaller
+    perturbation than usual."""
+    kinds: dict[tuple[tuple[str, ...], ...], list[Exchange]] = {}
+    for exchange in exchanges:
+        names = exchange.inputs.names, exchange.outputs.names
+        description = exchange.component.description
+        kind = (description.states, description.rates, *names)
+        kinds.setdefault(kind, []).append(exchange)
+    for (_, rates, entries, exits), members in kinds.items():
+        some = [] if len(members) == 1 else [e for e in members if _is_perturbed(e.component)]
+        asked = rates if derivatives else ()
+        for first in range(0, len(some), ALIKE):
+            part = some[first : first + ALIKE]
+            steps = [PerturbedStep(e.component, entries, exits, time, step_size) for e in part]
+            for exchange, found in zip(part, perturb_alike(steps, asked), strict=True):
+                if found is not None:
+                    moved = range(len(entries))
+                    yield _from_perturbation(
+                        exchange, found, entries, moved, (), derivatives=derivatives
+                    )
+
+
+def _is_perturbed(component: Component) -> bool:
+    """Return whether a component's linear model comes from perturbing it."""
+    return obstacle(component) is None and embedded_model(component) is None
+
+
+def _from_perturbation(
+    exchange: Exchange,
+    found: PerturbationResult,
+    entries: tuple[str, ...],
+    moved: Sequence[int],
+    observed: Sequence[str],
+    *,
+    derivatives: bool,
+) -> ComponentLinearization:
+    """The model of what a component answered; ``moved``: the places of the entries that were perturbed."""
+    names, rates = exchange.component.description.states, exchange.component.description.rates
+    n, p = len(names), len(exchange.outputs.names)
 
     def by_input(answers: Matrix) -> Matrix:
         if len(moved) == len(entries):
@@ -132,7 +182,7 @@ def linearize_component(
     if derivatives and len(rates) == n:
         A_c, B_c = small.slopes[:, :n], by_input(small.slopes)
     return ComponentLinearization(
-        component.name,
+        exchange.component.name,
         names,
         entries,
         exchange.outputs.names,

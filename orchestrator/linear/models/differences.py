@@ -16,6 +16,9 @@ from orchestrator.linear.models.answers_to_moves import Moves, answers_to_moves
 RESTS = 1e-9
 
 
+_Read = tuple[Matrix, Matrix, Matrix]
+
+
 class Differences(NamedTuple):
     """Columns of d(x⁺), d(y) and d(ẋ) by what was perturbed; ``_up`` from the perturbation upwards only."""
 
@@ -69,19 +72,39 @@ class PerturbedStep:
         unstepped: Collection[int] = (),
     ) -> tuple[Differences, ...]:
         """The same for several sizes, whose moves are made one after the other without a look at Python between."""
-        component = self.component
-        moved, after, outputs = self._batches
-        slopes = RealBatch(component, rates)
         places = np.array(varied, dtype=np.int64)
-        values = moved.read()[places]
+        values = self.values()[places]
         stepped = np.array([place not in unstepped for place in varied], dtype=bool)
         turns = [self._turns(places, values, size) for size in sizes]
         each = [turn.moves(places, values, stepped) for turn in turns]
-        moved_places, targets, steps = (np.concatenate(part) for part in zip(*each, strict=True))
+        moved, targets, follow = (np.concatenate(part) for part in zip(*each, strict=True))
+        answers, at_rest = self.answers(moved, targets, follow, rates)
+        found = _quotients(turns, answers, at_rest)
+        for one in found:
+            one.after[:, ~stepped] = one.after_up[:, ~stepped] = 0.0
+        return found
+
+    def values(self) -> Vector:
+        """Return the values of all variables where the component is."""
+        return self._batches[0].read()
+
+    def answers(
+        self,
+        places: NDArray[np.int64],
+        values: Vector,
+        steps: NDArray[np.bool_],
+        rates: Sequence[str],
+    ) -> tuple[_Read, _Read]:
+        """States after a step, outputs and rates before it: after each move, a row each, and where nothing is moved.
+
+        All variables are as `values` read them; the component is put back."""
+        component = self.component
+        moved, after, outputs = self._batches
+        slopes = RealBatch(component, rates)
         moves = Moves(
             moved,
-            moved_places,
-            targets,
+            places,
+            values,
             steps,
             before=(outputs, slopes),
             after=after,
@@ -91,21 +114,11 @@ class PerturbedStep:
         saved = component.save_state()
         try:
             at_rest = self._at_rest(slopes, saved)
-            answers = answers_to_moves(component, moves, saved)
+            found = answers_to_moves(component, moves, saved)
         finally:
             component.restore_state(saved)
             component.free_state(saved)
-        found, first = [], 0
-        for turn in turns:
-            own = slice(first, first + turn.count)
-            answered = (answers.after[own], *(batch[own] for batch in answers.before))
-            every = zip(answered, at_rest, strict=True)
-            columns, upwards = zip(*(turn.quotients(*one) for one in every), strict=True)
-            for column in (columns[0], upwards[0]):
-                column[~stepped] = 0.0
-            found.append(Differences(*(column.T for column in (*columns, *upwards))))
-            first += turn.count
-        return tuple(found)
+        return (found.after, *found.before), at_rest
 
     def _turns(self, places: NDArray[np.int64], values: Vector, size: float) -> "_Turns":
         """Both directions of each variable, but one alone where a parameter's bounds allow no other."""
@@ -130,7 +143,7 @@ class PerturbedStep:
         moved, states, outputs = (RealBatch(self.component, names) for names in groups)
         return moved, states, outputs
 
-    def _at_rest(self, slopes: RealBatch, saved: Any) -> tuple[Matrix, Matrix, Matrix]:
+    def _at_rest(self, slopes: RealBatch, saved: Any) -> _Read:
         """States after a step, outputs and rates before it where nothing is moved; the component is put back."""
         _, after, outputs = self._batches
         outputs.read()
@@ -208,14 +221,14 @@ class PerturbedStep:
 class _Turns:
     """How far each variable is moved in its first direction, and those that are moved in the other one as well."""
 
-    sizes: Vector
+    sizes: Vector  # of several components alike with a row for each
     first: Vector  # 1 or −1
     both: NDArray[np.int64]
 
     @property
     def count(self) -> int:
-        """Number of moves."""
-        return len(self.sizes) + len(self.both)
+        """Number of moves of a component."""
+        return len(self.first) + len(self.both)
 
     def moves(
         self, places: NDArray[np.int64], values: Vector, steps: NDArray[np.bool_]
@@ -224,25 +237,65 @@ class _Turns:
         both, there = self.both, values + self.first * self.sizes
         return (
             np.concatenate([places, places[both]]),
-            np.concatenate([there, values[both] - self.sizes[both]]),
+            np.concatenate([there, values[..., both] - self.sizes[..., both]], axis=-1),
             np.concatenate([steps, steps[both]]),
         )
 
     def quotients(self, answers: Matrix, at_rest: Vector) -> tuple[Matrix, Matrix]:
         """Central difference quotients, and those of the first direction alone; a row for each variable."""
-        count, first, both = len(self.sizes), self.first[:, None], self.both
-        other = np.empty((count, len(at_rest)))
+        count, first, both = len(self.first), self.first[:, None], self.both
+        at_rest = at_rest[..., None, :]
+        other = np.empty((*answers.shape[:-2], count, answers.shape[-1]))
         other[:] = at_rest
-        other[both] = answers[count:]
+        other[..., both, :] = answers[..., count:, :]
         width = self.sizes.copy()
-        width[both] *= 2
-        central = np.subtract(answers[:count], other, out=other)
+        width[..., both] *= 2
+        central = np.subtract(answers[..., :count, :], other, out=other)
         central *= first
-        central /= width[:, None]
-        one_sided = answers[:count] - at_rest
+        central /= width[..., None]
+        one_sided = answers[..., :count, :] - at_rest
         one_sided *= first
-        one_sided /= self.sizes[:, None]
+        one_sided /= self.sizes[..., None]
         return central, one_sided
+
+
+def _quotients(
+    turns: Sequence[_Turns], answers: Sequence[Matrix], at_rest: Sequence[Matrix]
+) -> tuple[Differences, ...]:
+    """Differences of each size from the answers to all moves, whose rows are those of one size after the other."""
+    found, first = [], 0
+    for turn in turns:
+        own = slice(first, first + turn.count)
+        every = zip((batch[..., own, :] for batch in answers), at_rest, strict=True)
+        columns, upwards = zip(*(turn.quotients(*one) for one in every), strict=True)
+        found.append(Differences(*(np.swapaxes(c, -1, -2) for c in (*columns, *upwards))))
+        first += turn.count
+    return tuple(found)
+
+
+def differences_of_alike(
+    steps: Sequence[PerturbedStep], sizes: Sequence[float], rates: Sequence[str] = ()
+) -> tuple[Differences, ...]:
+    """`PerturbedStep.differences_of_sizes` of all variables, for several components at once, as stacks of matrices.
+
+    ``steps``: of components whose variables have the same names in the same order, none of them a parameter."""
+    names = steps[0].names
+    places, stepped = np.arange(len(names)), np.ones(len(names), dtype=bool)
+    values = np.array([step.values() for step in steps])
+    turns = [
+        _Turns(size * np.maximum(1.0, np.abs(values)), np.ones(len(names)), places)
+        for size in sizes
+    ]
+    each = [turn.moves(places, values, stepped) for turn in turns]
+    moved, targets, follow = (np.concatenate(part, axis=-1) for part in zip(*each, strict=True))
+    answered = [
+        step.answers(moved, own, follow, rates) for step, own in zip(steps, targets, strict=True)
+    ]
+    answers, at_rest = (
+        tuple(np.array(part) for part in zip(*group, strict=True))
+        for group in zip(*answered, strict=True)
+    )
+    return _quotients(turns, answers, at_rest)
 
 
 def _allowed_signs(component: Component, name: str, value: float, step: float) -> tuple[float, ...]:

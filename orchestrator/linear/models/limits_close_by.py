@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from orchestrator.core.arrays import Matrix, Vector
 
 Answer = tuple[Matrix, Matrix]
-"""The states' change and d(y), a column for each state or input that was perturbed."""
+"""The states' change and d(y), a column for each state or input that was perturbed; of one component, or stacked of
+several alike."""
 
 Columns = NDArray[np.bool_]
 
@@ -55,7 +56,7 @@ class AnswersOfSize:
     def _apart(self, other: Answer, share: float) -> Columns:
         """Columns in which an answer differs from the first by more than a share of what is there."""
         far = [
-            (np.abs(a - b) > share * (np.abs(a) + floor)).any(axis=0)
+            (np.abs(a - b) > share * (np.abs(a) + floor)).any(axis=-2)
             for a, b, floor in zip(self.once, other, self.floors, strict=True)
         ]
         return np.asarray(far[0] | far[1])
@@ -76,7 +77,7 @@ class OneSidedColumns:
 
 def _movement(answer: Answer) -> Vector:
     """Return the largest movement per unit in each column of an answer, of the states or of the outputs."""
-    return np.asarray(np.abs(np.vstack(answer)).max(axis=0, initial=0.0))
+    return np.asarray(np.abs(np.concatenate(answer, axis=-2)).max(axis=-2, initial=0.0))
 
 
 def without_curvature(once: Answer, twice: Answer) -> Answer:

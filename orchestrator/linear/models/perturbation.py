@@ -8,7 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestrator.linear.models.differences import Differences, PerturbedStep
+from orchestrator.linear.models.differences import (
+    Differences,
+    PerturbedStep,
+    differences_of_alike,
+)
 from orchestrator.linear.models.held_response import differences_by_rates
 from orchestrator.linear.models.limits_close_by import AnswersOfSize, Columns, OneSidedColumns
 
@@ -65,6 +69,31 @@ def perturb(step: PerturbedStep, rates: Sequence[str], *, once: bool = False) ->
         columns = _those_of(columns, disagree)
     doubtful = tuple(name for k, name in enumerate(names) if k in columns or one_sided.now[k])
     return PerturbationResult(*found, usual, narrow, doubtful)
+
+
+def perturb_alike(
+    steps: Sequence[PerturbedStep], rates: Sequence[str]
+) -> list[PerturbationResult | None]:
+    """`perturb` for components whose variables have the same names, all at once; None where a smaller size is needed.
+
+    What NumPy has to do for one of them takes longer than its moves, and hardly longer for all of them."""
+    first, size = steps[0], PERTURBATIONS[0]
+    columns = range(len(first.names))
+    if rates:
+        (small,) = differences_of_alike(steps, (size,), rates)
+        (large,) = differences_of_alike(steps, (2 * size,))
+    else:
+        small, large = differences_of_alike(steps, (size, 2 * size))
+    answers = _answers(first, (small, large), columns, size)
+    uneven = OneSidedColumns(answers, size).now
+    found: list[PerturbationResult | None] = []
+    disagree = answers.disagree
+    for k in range(len(steps)):
+        one, other = (Differences(*(part[k] for part in pair)) for pair in (small, large))
+        doubtful = tuple(first.names[place] for place in np.flatnonzero(uneven[k]).tolist())
+        alone = PerturbationResult(one, other, other, {}, doubtful)
+        found.append(None if disagree[k].any() else alone)
+    return found
 
 
 def _with_both(
