@@ -10,10 +10,13 @@
 #define CURRENT (SOUGHT + 2 * NB)
 #define NODAL_SIZE (CURRENT + 2 * NB - OWN)
 
-/* What Y follows from is as it was when it was factorised. */
-static int unchanged(const double *w) {
+/* What Y follows from is as it was when it was factorised. A large network's parameters take as long to compare as its
+   factors to read; they are compared once after they were entered. */
+static int unchanged(double *w) {
     const double *made_of = w + MADE_OF + 1, *given = made_of + U;
-    if (!w[MADE_OF] || memcmp(made_of, SLOT, U * sizeof *w)) return 0;
+    if (!w[MADE_OF]) return 0;
+    if (!OF(w)->made_of_parameters && memcmp(made_of, SLOT, U * sizeof *w)) return 0;
+    OF(w)->made_of_parameters = 1;
     for (int k = 0; k < NG; ++k)
         if (memcmp(given + k, SLOT + U + GIVEN[k], sizeof *w)) return 0;
     return 1;
@@ -101,7 +104,7 @@ static void factorise_nodes(double *w) {
         for (int i = 0; i < 2 * NB; ++i) inverse[i] = NAN; /* no voltage is finite then, which the instance reports */
     memcpy(made_of, SLOT, U * sizeof *w);
     for (int k = 0; k < NG; ++k) made_of[U + k] = SLOT[U + GIVEN[k]];
-    w[MADE_OF] = 1;
+    w[MADE_OF] = OF(w)->made_of_parameters = 1;
 }
 
 /* Voltages in their slots, by bus: real parts, then imaginary parts. */

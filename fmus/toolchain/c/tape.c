@@ -101,7 +101,7 @@ static void enter(const double *z, double *w) {
         memcpy(SLOT, z, U * sizeof *z);
         execute(w, FIXED, SLOT + AT_FIXED);
         OF(w)->known = 1;
-        OF(w)->settled = 0;
+        OF(w)->settled = OF(w)->made_of_parameters = 0;
     }
     fill(w, U, z + U, NU);
 }

@@ -40,6 +40,7 @@ struct tape {
     double largest_rest; /* part of its terms that a row of Y v = i may leave over; with more, no voltage is finite */
     int known; /* whether the slots of p and c, and those that they fix, are filled */
     int settled; /* whether the slots of v hold the voltages at what the slots of p, c, u and x hold */
+    int made_of_parameters; /* whether a network's factors are known to be of what the slots of p and c hold */
     const int32_t *stepwise, *given_at, *perm, *row, *col, *diag, *mrow, *mcol;
     const uint32_t *run[SECTIONS], *result[SECTIONS], *operand[SECTIONS]; /* run: code and length of each */
 };
