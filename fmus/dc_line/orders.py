@@ -190,7 +190,7 @@ def declare_measured(m: ModelBuilder, p: Given, start: Start) -> Measured:
 
 
 @dataclass(frozen=True)
-class _Latch:
+class Latch:
     """A latch with a timer of how long it has acted [s]."""
 
     name: str
@@ -199,9 +199,10 @@ class _Latch:
 
     @property
     def acts(self) -> Expr:
+        """Return whether it is set."""
         return self.value > ACTING
 
-    def close(self, m: ModelBuilder, sets: Expr, least_time: Expr, released: Expr) -> None:
+    def close(self, m: ModelBuilder, sets: Expr, least_time: Expr | float, released: Expr) -> None:
         """Give what sets it, and what releases it after a least time [s]."""
         over = logic_and(self.timer >= least_time, released)
         holds = logic_or(sets, logic_and(self.acts, 1 - over))
@@ -211,26 +212,46 @@ class _Latch:
         m.derivative(self.timer, if_else(self.acts, 1, reset))
 
 
-def _latch(m: ModelBuilder, name: str, text: str) -> _Latch:
+def declare_latch(m: ModelBuilder, name: str, text: str) -> Latch:
+    """Declare the states of a latch."""
     value = m.state(name, 0.0, "1", f"{text}; it acts above {ACTING:g}")
-    return _Latch(name, value, m.state(f"{name}_for", 0.0, "s", f"{text}: time"))
+    return Latch(name, value, m.state(f"{name}_for", 0.0, "s", f"{text}: time"))
 
 
 @dataclass(frozen=True)
 class Interruptions:
     """States of what blocks, bypasses and comes back."""
 
-    blocking: _Latch
-    bypassing: _Latch
-    switching: _Latch
+    blocking: Latch
+    bypassing: Latch
+    switching: Latch
     condition: Condition
+
+
+@dataclass(frozen=True)
+class Triggers:
+    """Voltages of the rectifier's and the inverter's bus [pu], and what blocks, bypasses and ends both."""
+
+    v: Expr
+    far_v: Expr
+    blocks: Expr
+    unblocks: Expr
+    bypasses: Expr
+    unbypasses: Expr
+
+
+def triggers_at_once(p: Given, v: Expr, far_v: Expr, inverter_kv: Expr) -> Triggers:
+    """Return what acts at once, as all does in CDC4T.
+
+    ``inverter_kv``: the inverter's voltage, as if it were not bypassed [kV]."""
+    return Triggers(v, far_v, v < p.VBLOCK, v > p.VUNBL, inverter_kv < p.VBYPAS, far_v > p.VUNBY)
 
 
 def declare_interruptions(m: ModelBuilder, connected: Expr) -> Interruptions:
     """Declare latches and ramps; a line that its breaker parts from its bus is blocked."""
     with m.scope("interruption"):
         latches = [
-            _latch(m, name, text)
+            declare_latch(m, name, text)
             for name, text in (
                 ("blocking", "The line is blocked"),
                 ("bypassing", "The inverter is bypassed"),
@@ -251,17 +272,16 @@ def declare_interruptions(m: ModelBuilder, connected: Expr) -> Interruptions:
 
 
 def close_interruptions(
-    m: ModelBuilder, control: Control, s: Interruptions, v: Expr, far_v: Expr, inverter_kv: Expr
+    m: ModelBuilder, control: Control, s: Interruptions, triggers: Triggers, inverter_kv: Expr
 ) -> None:
     """Give what sets and releases the latches, and the ramps' rates.
 
-    ``v``, ``far_v``: voltages of the rectifier's and the inverter's bus [pu]; ``inverter_kv``: the inverter's voltage,
-    as if it were not bypassed [kV]."""
+    ``inverter_kv``: the inverter's voltage, as if it were not bypassed [kV]."""
     p, state = control.p, s.condition
-    s.blocking.close(m, v < p.VBLOCK, p.TBLOCK, v > p.VUNBL)
+    s.blocking.close(m, triggers.blocks, p.TBLOCK, triggers.unblocks)
     in_service = logic_and(1 - state.blocked, 1 - state.comes_back)
-    low = logic_and(in_service, inverter_kv < p.VBYPAS)
-    s.bypassing.close(m, low, p.TBYPAS, logic_or(far_v > p.VUNBY, state.blocked))
+    low = logic_and(in_service, triggers.bypasses)
+    s.bypassing.close(m, low, p.TBYPAS, logic_or(triggers.unbypasses, state.blocked))
     below = logic_and(logic_and(in_service, control.mode > CURRENT), inverter_kv < p.VCMOD)
     s.switching.close(m, logic_and(below, 1 - state.bypassed), p.TCMODE, inverter_kv > p.VCMOD)
     out = logic_or(state.blocked, state.bypassed)

@@ -1,13 +1,14 @@
-"""A rectifier's station with the control of the whole DC line, PSS/E's CDC4T (phasor type).
+"""A rectifier's station with the control of the whole DC line, PSS/E's CDC4T or CDC6T (phasor type).
 
 It solves the DC circuit by its own bus voltage and what the inverter tells (`circuit`), and tells the inverter what
 flows through its bridges. A bypassed inverter has no voltage, and the line's current does not flow through its
 bridges."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fmus.dc_line.bridges import BENCHMARK, DEGREE, Bridges, angle_of, declare_bridges
 from fmus.dc_line.circuit import Circuit, Far, Flow, Orders
+from fmus.dc_line.delays import declare_delays
 from fmus.dc_line.orders import (
     Condition,
     Control,
@@ -16,6 +17,7 @@ from fmus.dc_line.orders import (
     declare_control,
     declare_interruptions,
     declare_measured,
+    triggers_at_once,
 )
 from fmus.dc_line.station import USUAL, Station, declare_station
 from fmus.toolchain.model import Model
@@ -28,6 +30,9 @@ X_C = 13.585
 
 E_N = 213.456
 """Voltage at its valves [kV]."""
+
+CDC4T = "CDC4T"
+CDC6T = "CDC6T"
 
 INVERTER_KV = 490.0
 """The inverter's voltage of the benchmark [kV]: 500 kV at the rectifier less 2 kA through 5 ohm."""
@@ -65,10 +70,25 @@ class _Line:
         return Flow(if_else(bypassed, past, free.current), kilovolts, left)
 
 
-def lcc_rectifier_phasor() -> Model:
-    """The rectifier with the line's control, phasor type."""
-    title = "Rectifier of a DC line with the control CDC4T of PSS/E (phasor type)"
-    m = phasor_builder("lcc_rectifier_phasor", title, kind="load", usual=USUAL)
+def lcc_rectifier_phasor(records: str = CDC4T) -> Model:
+    """The rectifier with the line's control, phasor type.
+
+    Parameters
+    ----------
+    records
+        PSS/E's name of the control's record: CDC4T, or CDC6T, which waits before it blocks, bypasses and comes back.
+
+    Raises
+    ------
+    ValueError
+        If it is neither.
+    """
+    if records not in (CDC4T, CDC6T):
+        raise ValueError(f"records = {records!r}: write {CDC4T} or {CDC6T}")
+    title = f"Rectifier of a DC line with the control {records} of PSS/E (phasor type)"
+    waits = records == CDC6T
+    name = f"lcc_rectifier_{CDC6T.lower()}_phasor" if waits else "lcc_rectifier_phasor"
+    m = phasor_builder(name, title, kind="load", usual=USUAL)
     station = declare_station(m, P_0=-1.0)
     bridges = declare_bridges(m, X_C, E_N)
     circuit, mode = _declare_line(m)
@@ -79,6 +99,7 @@ def lcc_rectifier_phasor() -> Model:
     least = m.parameter("ALFDY", 5.0, "deg", text, minimum=0.0, maximum=90.0, source=BENCHMARK)
     control = declare_control(m, mode, circuit, start)
     measured = declare_measured(m, control.p, start)
+    delays = declare_delays(m) if waits else None
     interruptions = declare_interruptions(m, station.port.connected)
     line = _Line(
         bridges,
@@ -92,7 +113,10 @@ def lcc_rectifier_phasor() -> Model:
     now = line.flowing(v, seen)
     measured.follow(m, now.kilovolts, now.current)
     low = line.without_bypass(v, seen).kilovolts
-    close_interruptions(m, control, interruptions, v, line.far.v, low)
+    triggers = triggers_at_once(control.p, v, line.far.v, low)
+    if delays is not None:
+        triggers = delays.triggers(m, control, interruptions, triggers)
+    close_interruptions(m, control, interruptions, triggers, low)
 
     def after(v: Expr, time: Expr) -> Flow:
         return line.flowing(v, measured.after(time, now.kilovolts, now.current))
@@ -115,7 +139,7 @@ def lcc_rectifier_phasor() -> Model:
     m.output("I_order", control.current(*seen, line.state), "kA", "Order of the DC current")
     m.output("blocked", line.state.blocked, "1", "1 while the line is blocked")
     m.output("bypassed", line.state.bypassed, "1", "1 while the inverter is bypassed")
-    return m.build()
+    return replace(m.build(), of_parts=waits)
 
 
 def _declare_line(m: ModelBuilder) -> tuple[Circuit, Expr]:

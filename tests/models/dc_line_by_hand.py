@@ -163,3 +163,52 @@ class Line:
         ):
             up = 1.0 if rate <= 0 else min(1.0, self.share[name] + STEP * rate)
             self.share[name] = min(low, 1.0) if waits else up
+
+
+class DelayedLine(Line):
+    """A line that waits before it blocks, bypasses and comes back, by the times of its events."""
+
+    def __post_init__(self):
+        super().__post_init__()
+        self.began = {}  # what lasts, and since when
+        self.changes = []  # names of what went on or off, with their times
+
+    def _lasts(self, t, name, holds, wanted):
+        if not holds:
+            self.began.pop(name, None)
+            return False
+        return t - self.began.setdefault(name, t) >= wanted
+
+    def _told(self, t, name, now):
+        """Whether a message has arrived, which nothing takes back."""
+        if now:
+            self.began.setdefault(name, t)
+        return name in self.began and t - self.began[name] >= self.p["TCOM"]
+
+    def _switch(self, t, v, far_v, kilovolts, comes_back):
+        p, since = self.p, self.since
+        before = {name: since[name] is not None for name in ("blocked", "bypassed")}
+        if since["blocked"] is None:
+            low = self._lasts(t, "low", v < p["VRB"], p["TRB"])
+            asked = self._told(t, "asks", far_v < p["VIB"])
+            if v < p["VBLOCK"] or low or asked:
+                since["blocked"], self.began = t, {}
+        else:
+            high = self._lasts(t, "high", v >= p["VUNBL"], p["TRUB"])
+            far_high = self._lasts(t, "far high", far_v >= p["VUNBY"], p["TIUB"])
+            told = self._told(t, "permits", far_high)
+            if t - since["blocked"] >= p["TBLOCK"] and high and told:
+                since["blocked"], self.began = None, {}
+        if since["blocked"] is not None:
+            since["bypassed"] = None
+        elif since["bypassed"] is None:
+            in_service = not comes_back
+            low = self._lasts(t, "far low", in_service and far_v < p["VIY"], p["TIY"])
+            if in_service and (kilovolts < p["VBYPAS"] or low):
+                since["bypassed"] = t
+        else:
+            may_end = t - since["bypassed"] >= p["TBYPAS"] and far_v > p["VUNBY"]
+            if self._lasts(t, "ends", may_end, p["TIUY"]):
+                since["bypassed"] = None
+                self.began.pop("ends")
+        self.changes += [(x, t) for x, was in before.items() if was == (since[x] is None)]

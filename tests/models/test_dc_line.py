@@ -1,13 +1,14 @@
 """A DC line's stations against equations by hand: at rest, in frequency, into their limits, blocked and bypassed."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from fmus.dc_line.inverter import lcc_inverter_phasor
 from fmus.dc_line.rectifier import lcc_rectifier_phasor
-from tests.models.dc_line_by_hand import STEP, Line, drop, no_load, reactive
+from tests.models.dc_line_by_hand import STEP, DelayedLine, Line, drop, no_load, reactive
 from tests.models.parts import integrated, refused
 from tests.support.evaluated import Evaluated
 
@@ -19,6 +20,10 @@ DRIVE = no_load(FAR, FAR["v"]) * math.cos(math.radians(15))
 
 def rectifier(**values):
     return Evaluated(lcc_rectifier_phasor(), POINT | values)
+
+
+def delayed(**values):
+    return Evaluated(lcc_rectifier_phasor("CDC6T"), POINT | values)
 
 
 def inverter(**values):
@@ -122,11 +127,55 @@ Euler's method is 0.1 ms."""
 LATE = 6e-3
 """Delay by which a ramp may begin later [s]: three latches of the model in its steps of 1 ms."""
 
+LATE_BY_MESSAGE = 8e-3
+"""The same with a message, which is a latch as well [s]."""
+
+
+DELAYED = {
+    "blocked at once": ({}, {"v": 0.3}),
+    "blocked in time": ({}, {"v": 0.68}),
+    "not for long enough": ({"TRB": 0.2}, {"v": 0.68}),
+    "asked by the inverter": ({"TCOM": 0.04}, {"far_v": 0.1}),
+    "asked for a moment": ({"TCOM": 0.2, "VIY": 0.0, "VBYPAS": -1.0}, {"far_v": 0.1}),
+    "back behind the rectifier's time": ({"TRUB": 0.12}, {"v": 0.3}),
+    "back behind the inverter's time": ({"TIUB": 0.1, "TCOM": 0.05}, {"v": 0.3, "far_v": 0.7}),
+    "bypassed at once": ({}, {"drive": 0.2, "far_v": 0.3}),
+    "bypassed in time": ({"VBYPAS": -1.0}, {"drive": 0.6, "far_v": 0.4}),
+    "not bypassed": ({"VBYPAS": -1.0, "TIY": 0.2}, {"drive": 0.6, "far_v": 0.4}),
+    "a bypass that ends late": ({"TIUY": 0.1}, {"drive": 0.2, "far_v": 0.3}),
+    "blocked while bypassed": ({"VBYPAS": -1.0, "TRB": 0.1}, {"far_v": 0.4, "v": 0.68}),
+}
+"""What CDC6T does behind its times, and at once."""
+
 
 @pytest.mark.parametrize("kind", EVENTS)
 def test_it_moves_as_its_equations_by_hand(kind):
     own, change = EVENTS[kind]
     one = rectifier(**own)
+    _compare(one, Line(one.parameters, POINT["v_0"]), change, LATE if "VBLOCK" not in own else 0)
+
+
+@pytest.mark.parametrize("kind", DELAYED)
+def test_with_delays_it_moves_as_its_equations_by_hand(kind):
+    own, change = DELAYED[kind]
+    one = delayed(**own)
+    line = DelayedLine(one.parameters, POINT["v_0"])
+    found = _compare(one, line, change, LATE_BY_MESSAGE)
+    changes = [
+        (name, SLOW * k)
+        for name in ("blocked", "bypassed")
+        for k, (first, then) in enumerate(pairwise(row[name] for row in found), 2)
+        if first != then
+    ]
+    wanted = sorted(line.changes)
+    assert bool(wanted) == (not kind.startswith("not "))
+    assert [name for name, _ in changes] == [name for name, _ in wanted]
+    late = np.array([t for _, t in changes]) - [t for _, t in wanted]
+    assert np.all((late >= -SLOW) & (late <= LATE_BY_MESSAGE)), (changes, wanted)
+
+
+def _compare(one, line, change, late):
+    """Integrate a model and a line by hand through a change, and return the model's outputs."""
     rest = {"v": POINT["v_0"], "drive": 1.0, "far_v": FAR["v"], "holds": change.get("holds", 1.0)}
     if not rest["holds"]:  # at the angle of the start
         p = one.parameters
@@ -140,7 +189,7 @@ def test_it_moves_as_its_equations_by_hand(kind):
         return at_rectifier(at["v"], at["drive"] * DRIVE, at["far_v"], at["holds"])
 
     found, _ = integrated(one, inputs, max(AT), step=SLOW)
-    line, wanted = Line(one.parameters, POINT["v_0"]), []
+    wanted = []
     for k in range(round(max(AT) / STEP)):
         t = k * STEP
         at = now(t)
@@ -149,7 +198,7 @@ def test_it_moves_as_its_equations_by_hand(kind):
     I_0, V_0 = one.parameters["I_dc_0"], one.parameters["V_dc_0"]
     for time in AT:
         row = found[round(time / SLOW) - 1]
-        first = time - (LATE if "VBLOCK" not in own else 0)
+        first = time - late
         here = np.array(wanted[round(first / STEP) - 1 : round(time / STEP)])
         low, high = here.min(axis=0), here.max(axis=0)
         for name, k, size in (("I_dc", 0, I_0), ("V_inverter", 1, V_0)):
@@ -159,6 +208,7 @@ def test_it_moves_as_its_equations_by_hand(kind):
             assert least - 2.0 <= row["alpha"] <= most + 2.0, time
     moved = max(abs(row["V_inverter"] / V_0 - 1) + abs(row["I_dc"] / I_0 - 1) for row in found)
     assert moved > 0.02, "a trajectory that does not leave its start shows nothing"
+    return found
 
 
 def test_the_margin_keeps_the_current_the_inverter_then_holds():
@@ -231,6 +281,21 @@ def test_limits_let_the_operating_point_pass():
 )
 def test_what_cannot_start_is_refused(make, values, text):
     assert any(text in found for found in refused(Evaluated(make(), values)))
+
+
+def test_a_rectifier_of_another_record_is_refused():
+    with pytest.raises(ValueError, match="records = 'CDC1T': write CDC4T or CDC6T"):
+        lcc_rectifier_phasor("CDC1T")
+
+
+def test_delays_rest_at_the_start_and_move_nothing_in_service():
+    """Its modes are CDC4T's: the same rates of what both have, and no state of a delay that moves."""
+    plain, waiting = rectifier(), delayed()
+    for v in (1.02, 0.97):
+        own, more = plain.rates(at_rectifier(v)), waiting.rates(at_rectifier(v))
+        assert own == {name: more[name] for name in own}
+        assert not any(value for name, value in more.items() if name not in own)
+    assert plain.outputs(at_rectifier()) == waiting.outputs(at_rectifier())
 
 
 def test_nothing_of_the_output_follows_the_bus_voltage_at_once():

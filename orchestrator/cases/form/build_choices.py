@@ -21,7 +21,7 @@ PARTS = ("machine", "exciter", "governor", "stabilizer", "oel", "uel")
 
 RECORDS = "records"
 """Key of a component's table that names PSS/E's records of which a plant of WECC's generic models, or a static var
-compensator, is made."""
+compensator or a DC line's rectifier, is made."""
 
 CHOICES = (*PARTS, RECORDS)
 """Keys of a component's table that choose what its model is made of."""

@@ -60,6 +60,7 @@ def dc_components(draft: Draft) -> dict[str, ComponentTable]:
                 bus=station.bus,
                 parameters=values,
                 inputs=_constant_inputs(station),
+                records=station.records,
             )
             lines = dict.fromkeys(values, one.record.line)
             origin = UnitOrigin(one.record.file, frozenset(values), _COMMON, lines)

@@ -6,7 +6,7 @@ starts in the state that the power flow's solution has. Taps stay, as in PSS/E's
 import cmath
 import math
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from fmus.dc_line.dyr_records import DC_LINE_RECORDS, INVERTER, INVERTERS_FIELDS, RECTIFIER
@@ -14,7 +14,7 @@ from fmus.grid.element_data import Load
 from orchestrator.cases.form.remedies import without_models
 from orchestrator.cases.networks.psse.device_flow import SolvedDevices
 from orchestrator.cases.networks.psse.devices import HeldDevice, Voltages
-from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, given_values
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.dyr_values import values_of_record
 from orchestrator.cases.networks.psse.refusals import Refusals
 from orchestrator.cases.networks.psse.two_terminal import CURRENT, Pole, TwoTerminal
@@ -56,13 +56,15 @@ class SolvedLine:
 class StationOfLine:
     """A station: its component's name, its bus, its model and its parameters.
 
-    ``held``: voltage of a bus beyond what is studied [pu], which stays; ``bus`` is None there."""
+    ``held``: voltage of a bus beyond what is studied [pu], which stays; ``bus`` is None there; ``records``: PSS/E's
+    name of the record that a rectifier's control is built of."""
 
     name: str
     bus: str | None
     model: str
     parameters: dict[str, float | bool]
     held: complex | None = None
+    records: str | None = None
 
 
 @dataclass(frozen=True)
@@ -163,7 +165,7 @@ def _modelled(record: DynamicRecord, line: SolvedLine) -> ModelledLine:
     return ModelledLine(
         line,
         record,
-        _station(line, 0, RECTIFIER, at_rectifier),
+        replace(_station(line, 0, RECTIFIER, at_rectifier), records=record.name),
         _station(line, 1, INVERTER, at_inverter),
     )
 
@@ -223,7 +225,7 @@ def remarks_of_lines(lines: Sequence[ModelledLine]) -> Iterator[Problem]:
             )
             kind = "an end of a DC line beyond the part that is studied"
             yield Problem(one.record.place, text, topic=QuestionTopic(kind, one.line.name))
-        for kind, text in (*_doubts(one), *_omissions(one.record)):
+        for kind, text in _doubts(one):
             said = f"{one.record.name} of the DC line {one.line.name!r}: {text}"
             yield Problem(one.record.place, said, topic=QuestionTopic(kind, one.line.name))
 
@@ -247,13 +249,17 @@ def _doubts(one: ModelledLine) -> Iterator[tuple[str, str]]:
             f"{_KILO * pole.current:.4g} A flow; it is raised by what lacks. Correct C1 to C3"
         )
         yield "a DC line that starts above its limit of current", text
+    first, second = (abs(v) for v in one.line.v)
     for field, value, unit, what in (
-        ("VBLOCK", abs(one.line.v[0]), "pu", "the rectifier's bus has"),
+        ("VBLOCK", first, "pu", "the rectifier's bus has"),
+        ("VRB", first, "pu", "the rectifier's bus has"),
+        ("VIB", second, "pu", "the inverter's bus has"),
+        ("VIY", second, "pu", "the inverter's bus has"),
         ("VBYPAS", pole.inverter_kv, "kV", "the inverter has"),
         ("VCMOD", pole.inverter_kv, "kV", "the inverter has"),
     ):
         acts = field != "VCMOD" or p["mode"]
-        if acts and value < p[field]:
+        if acts and value < p.get(field, 0.0):
             text = f"{field} is {p[field]:g} {unit}, and {what} {value:.4g} {unit} at the start: it acts at once"
             yield f"a DC line that starts below {field}", text
     if p["VUNBL"] < p["VBLOCK"]:
@@ -268,20 +274,6 @@ def _doubts(one: ModelledLine) -> Iterator[tuple[str, str]]:
             "ever acts. Is it in per unit? Write kV, or 0 for none"
         )
         yield "a DC line whose VBYPAS may be in per unit", text
-
-
-def _omissions(record: DynamicRecord) -> Iterator[tuple[str, str]]:
-    """Yield kinds and texts of what the model leaves out of a record, by the fields that ask for it."""
-    known = DC_LINE_RECORDS[record.name]
-    given = given_values(record, known.fields, DC_LINE_RECORDS)
-    asked = [
-        f"{name} = {given[name]:g}: {text}" for name, text in known.omissions.items() if given[name]
-    ]
-    if asked:
-        yield (
-            f"{record.name} without what it adds to CDC4T",
-            f"left out in a run: {'; '.join(asked)}",
-        )
 
 
 def _limit_of_current(p: dict[str, float | bool], kilovolts: float) -> float:

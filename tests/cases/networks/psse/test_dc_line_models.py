@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -220,6 +221,18 @@ def test_a_fault_at_the_rectifier_blocks_it(gfor, prepared, tmp_path):
     assert [told["variable"] for told in interruptions_told(tmp_path)] == ["blocked"]
 
 
+def test_with_the_delays_of_cdc6t_it_blocks_and_comes_back_behind_them(gfor, prepared, tmp_path):
+    """TRB from the fault's begin; TIUB and TCOM from its end, which are longer than TBLOCK and TRUB."""
+    delays = "0.8 0.04 0.05 0 0.03 0 0.1 0.12 0 0.04"
+    text = CDC6T.format(delays).replace(" 0.6 0.65 0.1 80", " 0 0.65 0.1 0")
+    prepared(text)
+    responses(gfor, tmp_path, "--fault", "bus_5, 100 ms", "--stop", "3")
+    (told,) = interruptions_told(tmp_path)
+    assert told["variable"] == "blocked"
+    assert told["time"] == pytest.approx(1.04, abs=0.008)
+    assert told["until"] == pytest.approx(1.1 + 0.12 + 0.03, abs=0.01)
+
+
 def test_left_out_it_is_a_load_at_each_bus(prepared):
     ready = prepared(units="dyr_leave_out = ['CDC4T']")
     assert RECTIFIER not in ready.system.components
@@ -317,17 +330,34 @@ CDC6T = CDC4T.replace("CDC4T", "CDC6T").replace(" /", " {} /")
 OF_CDC6T = "{vrb} 0.1 0.05 0 0.02 0 0.1 0 0 0.04"
 
 
-def test_cdc6t_is_cdc4t_and_asks_about_what_it_adds(prepared):
+def test_cdc6t_is_cdc4t_with_its_own_delays(prepared):
     plain = prepared().system.components[RECTIFIER].parameters
     ready = prepared(CDC6T.format(OF_CDC6T.format(vrb=0.8)))
-    assert ready.system.components[RECTIFIER].parameters == plain
-    said = texts(ready)
-    assert "CDC6T: 1 DC line with the model of its record, 60 MW" in said
-    assert "VRB = 0.8: the line does not block after a time below this voltage" in said
-    assert "TRUB = 0.05: the line comes back" in said
-    assert "VIB" not in said
-    nothing = prepared(CDC6T.format("0 0.1 0 0 0.02 0 0.1 0 0 0.04"))
-    assert "left out in a run" not in texts(nothing)
+    plan = ready.system.components[RECTIFIER]
+    own = ("VRB", "TRB", "TRUB", "VIB", "TCOM", "VIY", "TIY", "TIUB", "TIUY")
+    assert [plan.parameters[name] for name in own] == [0.8, 0.1, 0.05, 0, 0.02, 0, 0.1, 0, 0]
+    assert {name: x for name, x in plan.parameters.items() if name not in own} == plain
+    assert plan.description.model_name == "lcc_rectifier_cdc6t_phasor"
+    assert "CDC6T: 1 DC line with the model of its record, 60 MW" in texts(ready)
+
+
+def test_the_modes_of_cdc6t_are_those_of_cdc4t(prepared):
+    """In service no delay acts."""
+    plain, waiting = (
+        [mode.eigenvalue for mode in compute_modes(ready).modes]
+        for ready in (prepared(), prepared(CDC6T.format(OF_CDC6T.format(vrb=0.8))))
+    )
+    assert plain
+    assert waiting == pytest.approx(plain, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("limits", "field"),
+    [("1.05 0.1 0.05 0", "VRB"), ("0.8 0.1 0 1.2", "VIB")],
+)
+def test_a_line_that_starts_below_a_limit_of_its_delays_is_asked_about(prepared, limits, field):
+    said = texts(prepared(CDC6T.format(f"{limits} 0.02 0 0.1 0 0 0.04")))
+    assert re.search(rf"{field} is [\d.]+ pu, and the \w+'s bus has .* at the start: it acts", said)
 
 
 def test_cdc6t_with_the_fields_of_cdc4t_is_refused(prepared):
