@@ -1,4 +1,4 @@
-"""What PSS/E's CDC6T adds to CDC4T: times behind which a line blocks, bypasses and comes back, and its messages.
+"""Delays of PSS/E's CDC6T: times behind which a line blocks, bypasses and comes back, and its stations' messages.
 
     blocked     at once below VBLOCK at the rectifier's bus; after TRB below VRB there; TCOM after the inverter's bus
                 fell below VIB
@@ -116,8 +116,8 @@ def declare_delays(m: ModelBuilder) -> Delays:
     """Declare the parameters and the states of what CDC6T adds."""
     p = declared(m, LINES, SOURCE)
     with m.scope("delay"):
-        low, high, far_low, far_high, ends = (
-            _Span(m.state(name, 0.0, "s", text))
+        spans = {
+            name: _Span(m.state(name, 0.0, "s", text))
             for name, text in (
                 ("low", "Time for which the rectifier's bus has been below VRB"),
                 ("high", "Time for which it has been above VUNBL, of a blocked line"),
@@ -125,7 +125,7 @@ def declare_delays(m: ModelBuilder) -> Delays:
                 ("far_high", "Time for which it has been above VUNBY, of a blocked line"),
                 ("ends", "Time for which it has been, of a bypass that may end"),
             )
-        )
+        }
         asks = declare_latch(m, "asks", "The inverter asks for blocking")
         permits = declare_latch(m, "permits", "The inverter says that it may come back")
-    return Delays(p, low, high, far_low, far_high, ends, asks, permits)
+    return Delays(p, **spans, asks=asks, permits=permits)
