@@ -62,6 +62,24 @@ end
 _CASES_IN_FISH = "(string split ' ' -- '{cases}'; __fish_complete_path (commandline -ct))"
 """fish runs these words for each completion."""
 
+_LOADED = """\
+in bash, for this shell alone:
+  source <(gfor completion bash)
+in bash, for every new one (with the package bash-completion):
+  mkdir -p ~/.local/share/bash-completion/completions
+  gfor completion bash > ~/.local/share/bash-completion/completions/gfor
+in zsh:
+  mkdir -p ~/.zfunc
+  gfor completion zsh > ~/.zfunc/_gfor
+  and in ~/.zshrc: fpath=(~/.zfunc $fpath); autoload -Uz compinit && compinit
+in fish:
+  mkdir -p ~/.config/fish/completions
+  gfor completion fish > ~/.config/fish/completions/gfor.fish
+
+After an update of gfor-cosim, write the file again.
+"""
+"""How each shell takes what is printed."""
+
 _FOLDERS = ("DIR", "FOLDER")
 """Metavariables of the arguments that take a folder."""
 
@@ -71,6 +89,8 @@ _FILES = ("FILE.fmu", "DEVICE", "NETWORK", "vendor.toml", "[NAME=]FILE")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("shell", choices=SHELLS, help="the shell that reads the result")
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = _LOADED
 
 
 def run(options: argparse.Namespace) -> int:

@@ -1,7 +1,9 @@
-"""``gfor completion``: what the Tab key gives in bash."""
+"""``gfor completion``: what the Tab key gives in bash and fish."""
 
+import os
 import shutil
 import subprocess
+import sysconfig
 from contextlib import redirect_stdout
 
 import pytest
@@ -65,6 +67,46 @@ def complete(folder, words):
 )
 def test_bash_offers(folder, words, offered):
     assert complete(folder, words) == offered
+
+
+@pytest.mark.skipif(shutil.which("fish") is None, reason="there is no fish")
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("gfor mod", {"modes"}),
+        ("gfor fmu check --bind", {"--binding"}),
+        ("gfor modes ieee11", {"ieee118"}),
+        ("gfor modes own_case.toml --scenario ", {"windy", "calm"}),
+        ("gfor run two_area --stop ", set()),
+    ],
+)
+def test_fish_offers(folder, gfor, words, offered):
+    place = folder / "config" / "fish" / "completions"
+    place.mkdir(parents=True, exist_ok=True)
+    (place / "gfor.fish").write_text(gfor("completion", "fish")[1], encoding="utf-8")
+    done = subprocess.run(
+        ["fish", "-c", f"complete -C '{words}'"],
+        cwd=folder,
+        env={
+            "PATH": f"{sysconfig.get_path('scripts')}:{os.environ['PATH']}",
+            "HOME": str(folder),
+            "XDG_CONFIG_HOME": str(folder / "config"),
+        },
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert {line.partition("\t")[0] for line in done.stdout.splitlines()} == offered
+
+
+def test_the_help_says_how_each_shell_loads_it(gfor):
+    text = gfor("completion", "--help")[1]
+    for place in (
+        "source <(gfor completion bash)",
+        "gfor completion zsh > ~/.zfunc/_gfor",
+        "gfor completion fish > ~/.config/fish/completions/gfor.fish",
+    ):
+        assert place in text
 
 
 @pytest.mark.parametrize("shell", SHELLS)
