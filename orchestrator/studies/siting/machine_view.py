@@ -115,10 +115,9 @@ def _confirmed(result: MachineSites, one: Confirmation, before: float) -> str:
     if one in result.breaking:
         word += ", but UNSTABLE with it"
     gain = "" if one.setting is None else f" (K {one.setting.gain:g} pu{end_of_search(one)})"
-    return (
-        f"{one.bus}: {word} by coupled FMUs: {before:.2f} % → {one.damping:.2f} % with a POD{gain}; "
-        f"{least_then(one, before)}; predicted and coupled shift differ by {100 * one.error:.2g} %"
-    )
+    off = f"prediction off by {100 * one.error:.2g} %"
+    steps = f"{before:.2f} % → {one.damping:.2f} % with a POD{gain}"
+    return f"{one.bus}: {word} by coupled FMUs ({off}): {steps}; {least_then(one, before)}"
 
 
 def remarks(result: MachineSites) -> list[str]:

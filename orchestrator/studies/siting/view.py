@@ -206,17 +206,16 @@ def _confirmed(result: SiteResult, one: Confirmation, before: float) -> str:
     if one.failure:
         return f"{one.bus}: NOT CONFIRMED: {one.failure}"
     word = "confirmed" if one.agrees else "NOT CONFIRMED"
-    steps = f"{before:.2f} % → {one.damping_alone:.2f} % with {_rated(result)}"
+    device = "the device" if result.by_coupled else _rated(result)  # whose rating the answer tells
+    steps = f"{before:.2f} % → {one.damping_alone:.2f} % with {device}"
     if one.setting is not None:
         steps += (
             f" → {one.damping:.2f} % with its POD (K {one.setting.gain:g} pu{end_of_search(one)})"
         )
     if one in result.breaking:
         word += ", but UNSTABLE with it (`gfor modes` of a case with it tells the cause, often the step)"
-    return (
-        f"{one.bus}: {word} by coupled FMUs: {steps}; {least_then(one, before)}; predicted and "
-        f"coupled shift differ by {100 * one.error:.2g} %"
-    )
+    off = f"prediction off by {100 * one.error:.2g} %"
+    return f"{one.bus}: {word} by coupled FMUs ({off}): {steps}; {least_then(one, before)}"
 
 
 def end_of_search(one: Confirmation) -> str:
@@ -234,7 +233,7 @@ def end_of_search(one: Confirmation) -> str:
 def least_then(one: Confirmation, before: float) -> str:
     """The least damped mode with the device: whether it is another one, and has less than the least before."""
     if one.other is None:
-        return "it is the least damped then as well"
+        return "it stays the least damped"
     percent = damping_percent(one.other)
     worse = f", LESS than the least before, {before:.2f} %" if percent < before else ""
     return f"least damped then is another mode: {one.other.imag / math.tau:.3f} Hz, {percent:.2f} %{worse}"

@@ -110,8 +110,8 @@ def test_what_the_device_brings_without_its_pod_stands_in_a_column(five, monkeyp
 @pytest.mark.parametrize(
     ("other", "said", "costs"),
     [
-        (None, "it is the least damped then as well", False),
-        (14.0, "least damped then is another mode: 1.733 Hz, 14.00 %;", False),
+        (None, "it stays the least damped", False),
+        (14.0, "least damped then is another mode: 1.733 Hz, 14.00 %", False),
         (2.0, "least damped then is another mode: 1.750 Hz, 2.00 %, LESS than the least", True),
     ],
 )
