@@ -172,17 +172,25 @@ class SwingGroups:
     between: dict[str, float]
 
     def words(self, most: Callable[[Sequence[str]], str]) -> str:
-        """Who swings against whom: ``sg1, sg2 against sg3; sg4 at +87°``; "" if nothing moves.
+        """Who swings against whom: ``sg1, sg2 against sg3; sg4 leads by 87°``; "" if nothing moves.
 
         ``most``: Writes a list of components."""
         sides = [most([_component(s) for s in side]) for side in (self.together, self.against)]
         said = " against ".join(side for side in sides if side)
-        apart = most([f"{_component(s)} at {angle:+.0f}°" for s, angle in self.between.items()])
-        return f"{said}; {apart}" if apart else said
+        apart = most([f"{_component(s)} {_ahead(angle)}" for s, angle in self.between.items()])
+        if apart:
+            return f"{said}; {apart}"
+        is_alone = len(self.together) == 1 and not self.against
+        return f"{said} alone" if is_alone else said
 
 
 def _component(state: str) -> str:
     return state.partition(".")[0]
+
+
+def _ahead(angle: float) -> str:
+    """Return an angle [degrees] in words, as ``leads by 87°``."""
+    return f"{'leads' if angle > 0 else 'lags'} by {abs(angle):.0f}°"
 
 
 @dataclass(frozen=True)

@@ -265,7 +265,8 @@ def _of_the_bounds(d: PodDesign) -> Iterable[str]:
         yield _out_of_reach(d, d.refinement) if d.refinement else _other_gain(d)
     elif d.final is d.designed and d.active_bound == "lower":
         yield (
-            f"the lower bound of the gain is active, {d.unbounded_gain:.4g} pu were computed before it: "
+            f"the sensitivity asks for K = {d.unbounded_gain:.4g} pu, and the bounds allow no less than "
+            f"{d.final.setting.gain:.4g} pu (both on the converter's base S_n): "
             + Option.GAIN_BOUNDS
             + f" 0:{d.request.bounds(search=True)[1]:g} "
             + Option.REFINE

@@ -175,8 +175,8 @@ def test_a_design_is_that_of_the_command(gfor, tmp_path, two_area):
     assert by_file.values == two_area.scenario("gfor", design.parameters).values
     assert "requirement met" in design._repr_html_()
     assert (
-        "the lower bound of the gain is active, 18.45 pu were computed before it: gain_bounds 0"
-        in design.verdict
+        "the sensitivity asks for K = 18.45 pu, and the bounds allow no less than 200 pu "
+        "(both on the converter's base S_n): gain_bounds 0" in design.verdict
     )
     assert design.verdict in design._repr_html_()
     assert design.table().loc["with it", "damping_percent"] > 20

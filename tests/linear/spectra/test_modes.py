@@ -119,9 +119,13 @@ def test_who_stands_across_is_neither_together_nor_against():
     assert groups.together == ("sg1.omega", "sg2.omega")
     assert groups.against == ("sg4.omega",)
     assert groups.between == {"sg3.omega": pytest.approx(87.0)}
-    assert groups.words(", ".join) == "sg1, sg2 against sg4; sg3 at +87°"
+    assert groups.words(", ".join) == "sg1, sg2 against sg4; sg3 leads by 87°"
     alone = mode.swing_groups(["sg1.omega", "sg3.omega"])
-    assert alone.words(", ".join) == "sg1; sg3 at +87°"
+    assert alone.words(", ".join) == "sg1; sg3 leads by 87°"
+    assert mode.swing_groups(["sg3.omega", "sg2.omega"]).words(", ".join) == "sg2; sg3 leads by 47°"
+    assert mode.swing_groups(["sg3.omega"]).words(", ".join) == "sg3 alone"
+    turned = mode.swing_groups(["sg2.omega", "sg4.omega"])
+    assert turned.words(", ".join) == "sg2; sg4 leads by 132°"
     assert mode.swing_groups([]).words(", ".join) == ""
 
 

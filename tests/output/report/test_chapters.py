@@ -320,7 +320,7 @@ def test_what_changed_since_an_older_page(folders, tmp_path):
     )
     text = written(folders, tmp_path, against=old)
     assert (
-        "not judged: gfor is beyond its rating"
+        "doubt: gfor is beyond its rating"
         in text[text.index("Answers that differ") : text.index("</section>")]
     )
     (folders[0] / "pod_p.json").write_text(
@@ -684,6 +684,23 @@ def test_of_two_scenarios_only_the_unstable_one_is_red(tmp_path):
     both = "the least damped swing has 10.60 % (POD-Q) to 22.60 % (POD-P)"
     assert green == [f"POD-P, POD-Q: stable, {both}", "stable", "stable"]
     assert text.count("grows") == text.count("no governor") == 1
+    assert "<li>Doubts: no governor</li><li>Not judged: nothing was left out</li>" in text
+
+
+def test_the_sentence_for_the_boss_counts_the_scenarios_that_are_well(tmp_path):
+    """Four titles once stood in it, each also in the table below, which made a paragraph of the answer."""
+    well = [
+        {"name": name, "title": name.upper(), "answer": CALM | {"damping_percent": percent}}
+        for name, percent in (("p", 22.6), ("q", 24.9), ("pq", 23.9))
+    ]
+    base = {"name": "base", "title": "Base", "answer": SHAKY}
+    spread = "stable, the least damped swing has 22.60 % (P) to 24.90 % (Q)"
+    text = first_page([of_run(tmp_path, [*well, base])])
+    assert re.findall(r'<p class="verdict">.*?</p>', text) == [
+        '<p class="verdict"><b class="bad">Base: UNSTABLE, its least damped swing has −0.90 %</b>; '
+        f'<b class="good">the 3 others: {spread}</b>.</p>'
+    ]
+    assert f'<b class="good">All 3: {spread}</b>' in first_page([of_run(tmp_path, well)])
 
 
 def test_what_several_rows_do_not_judge_is_told_once(tmp_path):
@@ -781,7 +798,7 @@ def test_a_prediction_says_its_gain_if_a_bound_changed_it(tmp_path):
 
 
 def test_a_design_says_its_figures_once_with_units_and_by_the_planners_name(tmp_path):
-    remark = "the lower bound of the gain is active, 18.45 pu were computed before it"
+    remark = "the sensitivity asks for K = 18.45 pu, and the bounds allow no less"
     said = f"the target has 18.00 % of damping, 20.00 % are required; {remark}"
     sheet = SHEET | {"controller": "pod_p", "verdict": said, "remarks": [remark]}
     text = written([made(tmp_path / "one", "design", sheet)], tmp_path)

@@ -529,7 +529,7 @@ def test_points_without_a_verdict_are_counted_and_warnings_are_said(
     ]
     with xr.open_dataset(out / "sweep.nc") as data:
         assert data["warnings"].values[0].tolist() == ["", "the step hides 2 %"]
-        assert "at 1 of 2 points: the step hides 2 %" in of_sweep(out, data).not_judged
+        assert "at 1 of 2 points: the step hides 2 %" in of_sweep(out, data).doubts
         hertz = data["largest_growth_frequency"].values[0]
     with (out / "sweep.csv").open(encoding="utf-8") as file:
         beside = {

@@ -13,7 +13,8 @@ from orchestrator.output.report.short_texts import short
 _NOTHING = "nothing was left out"
 
 _OPEN = 4
-"""So many sentences about what a study did not judge stand on the first page; the others are counted."""
+"""So many doubts of a study stand on the first page, and so many sentences about what it did not judge; the others are
+counted."""
 
 _LONGEST = 240
 """Characters of each of them: three lines of the page."""
@@ -23,7 +24,8 @@ def first_page(chapters: Sequence[Chapter], title: str = "") -> str:
     """Return the verdicts by scenario, then the answers of all other studies: one as a sentence, several in a table.
 
     ``title``: the page's, which stands above; a question that it asks is not asked again."""
-    open_ = Counter(text for one in chapters for text in dict.fromkeys(one.not_judged))
+    told = ({*one.not_judged, *one.doubts} for one in chapters)
+    open_ = Counter(text for texts in told for text in sorted(texts))
     shared = [text for text, count in open_.items() if count > 1]
     notes = {text: f"note {k}" for k, text in enumerate(shared, start=1)}
     by_scenario = "".join(_of_scenarios(one, notes, title) for one in chapters if one.lines)
@@ -63,6 +65,7 @@ def _answer_with_notes(chapter: Chapter, answer: str, notes: dict[str, str], tit
     """Return a study's question, its answer, and in short notes below how sure that is."""
     below = [
         ("How sure", escape(short(chapter.sure, 2 * _LONGEST))),
+        ("Doubts", "; ".join(_sentences(chapter.doubts, notes))),
         ("Not judged", "; ".join(_not_judged(chapter, notes))),
         ("Results", escape(", made by ".join(_places_and_options(chapter)))),
     ]
@@ -77,7 +80,7 @@ def _row(chapter: Chapter, notes: dict[str, str]) -> list[str]:
     return [
         f'{escape(chapter.question)}<span class="soft">{given}</span>',
         f'<span class="{SHADES[chapter.good]}">{escape(chapter.answer)}</span>',
-        escape(short(chapter.sure, 2 * _LONGEST)),
+        "<br>".join(_sure_and_doubts(chapter, notes)),
         "<br>".join(_not_judged(chapter, notes)),
     ]
 
@@ -87,10 +90,19 @@ def _places_and_options(chapter: Chapter) -> list[str]:
     return [text for text in (str(chapter.source), given_in(chapter.origin)) if text]
 
 
+def _sure_and_doubts(chapter: Chapter, notes: dict[str, str]) -> list[str]:
+    doubts = [f"doubt: {text}" for text in _sentences(chapter.doubts, notes)]
+    return [escape(short(chapter.sure, 2 * _LONGEST)), *doubts]
+
+
 def _not_judged(chapter: Chapter, notes: dict[str, str]) -> list[str]:
-    """List what the study did not judge; a sentence of several studies is a note below them."""
-    told = [escape(notes.get(text) or short(text, _LONGEST)) for text in chapter.not_judged]
-    return [*told[:_OPEN], *_more(len(told))] or [_NOTHING]
+    return _sentences(chapter.not_judged, notes) or [_NOTHING]
+
+
+def _sentences(texts: Sequence[str], notes: dict[str, str]) -> list[str]:
+    """Shorten a study's sentences, and count those beyond a few; one of several studies is a note below them."""
+    told = [escape(notes.get(text) or short(text, _LONGEST)) for text in texts]
+    return [*told[:_OPEN], *_more(len(told))]
 
 
 def _more(count: int) -> list[str]:

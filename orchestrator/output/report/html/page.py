@@ -369,11 +369,12 @@ def _answer_of(chapter: Chapter) -> Answer:
     source, folder = chapter.source.name, chapter.source.absolute().parent.name
     if chapter.source.is_dir():
         source, folder = "", chapter.source.name
-    not_judged = "".join(f"; not judged: {text}" for text in chapter.not_judged)
+    beside = [f"; not judged: {text}" for text in chapter.not_judged]
+    beside += [f"; doubt: {text}" for text in chapter.doubts]
     return {
         "question": chapter.question,
         "source": source,
-        "answer": chapter.answer + not_judged,
+        "answer": chapter.answer + "".join(beside),
         "given": given_in(chapter.origin),
         "least": [mode.as_json() for mode in chapter.least],
         "folder": folder,

@@ -260,7 +260,8 @@ def _participation(results: Results, figures: Figures) -> str:
             f"Participation of whole components in the {name} mode: the sum over their states.",
         )
         sides = "; ".join(
-            f"{escape(s['title'])}: {escape(', '.join(a[:4]) or '–')} against {escape(', '.join(b[:4]) or 'nobody')}"
+            f"{escape(s['title'])}: {escape(', '.join(a[:4]) or '–')}"
+            + (f" against {escape(', '.join(b[:4]))}" if b else ", with no machine opposite")
             for s in results.scenarios
             if (swing := s.get("swing", {}).get(name))
             for a, b in [swing]

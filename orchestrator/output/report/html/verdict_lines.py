@@ -14,8 +14,8 @@ from orchestrator.output.report.short_texts import LONGEST_REMARK, short
 
 _WORST_FIRST: Mapping[bool | None, int] = {False: 0, None: 1, True: 2}
 
-_NAMES_IN_A_SENTENCE = 4
-"""So many scenarios are named in the sentence, the others are counted: the lines below name all."""
+_NAMES_IN_A_SENTENCE = 2
+"""So many scenarios of one verdict are named in the sentence; more are counted: the lines below name all."""
 
 _NONE = "–"
 
@@ -77,27 +77,29 @@ def _figures(mode: LeastDamped) -> str:
 
 def verdicts(lines: Sequence[VerdictLine]) -> str:
     """Return the sentence over all scenarios and the table of their lines, as a page has them."""
-    columns = ["Scenario", "Verdict", "Least damped: f [Hz]", "Damping [%]"]
+    columns = ["Scenario", "Verdict", "Least damped"]
     after = any(line.after for line in lines)
     in_time = any(line.in_time for line in lines)
-    columns += ["After the events: f [Hz]", "Damping [%]"] if after else []
-    columns += ["In the run: f [Hz]", "Damping [%]"] if in_time else []
+    columns += ["After the events"] if after else []
+    columns += ["In the run"] if in_time else []
     columns.append("Remark")
     rows = []
     for line in lines:
         row = [escape(line.scenario), _in_colour(line.verdict, line.stable)]
-        row += _cells(line.least)
-        row += _cells(line.after) if after else []
-        row += _cells(line.in_time) if in_time else []
+        row.append(_cell(line.least))
+        row += [_cell(line.after)] if after else []
+        row += [_cell(line.in_time)] if in_time else []
         row.append(f'<span class="remark">{escape(line.remark)}</span>')
         rows.append(row)
     return f'<p class="verdict">{_sentence(lines)}</p>{table("Verdicts", columns, rows, left=2)}'
 
 
-def _cells(mode: LeastDamped | None) -> list[str]:
+def _cell(mode: LeastDamped | None) -> str:
     if mode is None:
-        return [_NONE, _NONE]
-    return [f"{mode.frequency_hz:.3f}", damping(mode.damping_percent)]
+        return _NONE
+    return (
+        f'<span class="mode">{mode.frequency_hz:.3f} Hz, {damping(mode.damping_percent)} %</span>'
+    )
 
 
 def _sentence(lines: Sequence[VerdictLine]) -> str:
@@ -105,17 +107,23 @@ def _sentence(lines: Sequence[VerdictLine]) -> str:
     alike: dict[tuple[bool | None, str], list[VerdictLine]] = {}
     for line in sorted(lines, key=lambda one: _WORST_FIRST[one.stable]):
         alike.setdefault((line.stable, line.verdict), []).append(line)
-    parts = [
-        _in_colour(
-            f"{few(_scenarios(found), _NAMES_IN_A_SENTENCE)}: {verdict}{_worst(found)}", stable
-        )
-        for (stable, verdict), found in alike.items()
-    ]
+    last = list(alike.values())[-1]
+    parts = []
+    for (stable, verdict), found in alike.items():
+        names = _names_or_count(found, len(lines)) if found is last else _names(found)
+        parts.append(_in_colour(f"{names}: {verdict}{_worst(found)}", stable))
     return "; ".join(parts) + "."
 
 
-def _scenarios(lines: Sequence[VerdictLine]) -> list[str]:
-    return [line.scenario for line in lines]
+def _names(lines: Sequence[VerdictLine]) -> str:
+    return few([line.scenario for line in lines], _NAMES_IN_A_SENTENCE)
+
+
+def _names_or_count(lines: Sequence[VerdictLine], of: int) -> str:
+    """Name the scenarios of the best verdict, or where they are many, count them."""
+    if len(lines) <= _NAMES_IN_A_SENTENCE:
+        return _names(lines)
+    return f"All {of}" if len(lines) == of else f"the {len(lines)} others"
 
 
 def _worst(lines: Sequence[VerdictLine]) -> str:

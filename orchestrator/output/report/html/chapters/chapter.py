@@ -35,6 +35,7 @@ class Chapter:
     good: bool | None
     sure: str = ""
     not_judged: Sequence[str] = ()
+    doubts: Sequence[str] = ()  # warnings, and questions that the files raise, of what was judged
     content: str = ""
     page: str = ""
     title: str = ""
@@ -63,7 +64,7 @@ def with_models(chapter: Chapter, content: Any) -> Chapter:
     return replace(
         chapter,
         sure=sure,
-        not_judged=list(dict.fromkeys([*chapter.not_judged, *more])),
+        doubts=list(dict.fromkeys([*chapter.doubts, *more])),
         bases=bases,
         names={name: shown for one in records for name, shown in one.get("names", {}).items()},
     )

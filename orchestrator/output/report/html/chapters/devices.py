@@ -54,13 +54,22 @@ def of_certificate(file: Path, c: Content) -> Chapter:
         texts for point in c.get("points", []) for texts in point.get("warnings", {}).values()
     ]
     check: Content = c.get("acceptance") or {}
-    open_ += dict.fromkeys([*chain(*warned), *_unjudged(check.get("checks", []))])
+    open_ += dict.fromkeys(_unjudged(check.get("checks", [])))
     trusted = check.get("trusted") is not False
     good = {"passes": trusted, "fails": False}.get(c["verdict"])
     tests = number_of(len(c["rows"]), "test") if "rows" in c else ""
     sure = f"judged: {c['judged']}" if c.get("judged") else tests
     question = f"Does the converter pass the tests of {c['code'].upper() if 'code' in c else 'the grid code'}?"
-    return Chapter(file, question, c["sentence"], good, sure, open_, page="certificate.html")
+    return Chapter(
+        file,
+        question,
+        c["sentence"],
+        good,
+        sure,
+        not_judged=open_,
+        doubts=list(dict.fromkeys(chain(*warned))),
+        page="certificate.html",
+    )
 
 
 def of_matrix(file: Path, c: Content) -> Chapter:

@@ -60,7 +60,7 @@ def of_identified(file: Path, modes: Any) -> Chapter:
         answer=f"strongest: {figures}",
         good=None,
         sure=sure,
-        not_judged=doubts,
+        doubts=doubts,
         content=modes_map("Modes", {"record": modes})
         + table("Modes", ["f [Hz]", "Damping [%]", "Amplitude", "Doubts"], rows, left=0),
     )
@@ -89,7 +89,8 @@ def of_sources(file: Path, records: Any) -> Chapter:
         answer="; ".join(said) or "nothing oscillates",
         good=None,
         sure=f"power and voltage of {sum(len(c['places']) for c in records)} places",
-        not_judged=[*unnamed, *(text for c in records for text in c["remarks"])],
+        not_judged=unnamed,
+        doubts=[text for c in records for text in c["remarks"]],
         content=table(
             "Oscillations",
             ["Record", "Oscillation", "Kind", "Source", "Why", "Next"],

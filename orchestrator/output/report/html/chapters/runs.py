@@ -33,7 +33,7 @@ def of_run(
         if line.stable is None and not line.remark:
             reason = (s.get("stability") or {}).get("reason")
             open_.append(f"{line.scenario}: {reason or 'stability'}")
-    open_ += dict.fromkeys(text for s in scenarios for text in s.get("warnings", []))
+    warned = (text for s in scenarios for text in s.get("warnings", []))
     good = all_true(line.stable for line in lines)
     basis = (
         "modes of the FMUs that were simulated"
@@ -48,6 +48,7 @@ def of_run(
         good=good,
         sure="; ".join([*kinds_of(scenarios), *faults_of(scenarios), basis]),
         not_judged=open_,
+        doubts=list(dict.fromkeys(warned)),
         content=content,
         bases=bases_of(scenarios),
         least=[mode for line in lines for mode in line.modes],

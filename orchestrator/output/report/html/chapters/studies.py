@@ -170,7 +170,7 @@ def of_sweep(place: Path, sweep: xr.Dataset) -> Chapter:
     lost = 0 if stable is None else int((stable == 0).sum())
     unknown = 0 if stable is None else int((~stable.isin([0, 1])).sum())
     open_ = [f"stability at {number_of(unknown, 'point')}"] if unknown else []
-    open_ += json.loads(sweep.attrs.get("warned", "[]"))
+    doubts = json.loads(sweep.attrs.get("warned", "[]"))
     about = {
         "models": sweep.attrs.get("models"),
         "basis": json.loads(sweep.attrs.get("basis", "{}")),
@@ -187,6 +187,7 @@ def of_sweep(place: Path, sweep: xr.Dataset) -> Chapter:
             holds or None,
             f"{models}coarse values, then bisection; each is of the coupled FMUs at an operating point of its own",
             [*open_, "narrow pieces between the values that were tried"],
+            doubts=doubts,
             bases=bases,
         )
     answer = f"least damping {float(least.min()):.2f} % at {where}" + (
@@ -199,6 +200,7 @@ def of_sweep(place: Path, sweep: xr.Dataset) -> Chapter:
         False if lost else None,
         f"{models}each point is a linear model of the coupled FMUs there",
         open_,
+        doubts=doubts,
         bases=bases,
     )
 
