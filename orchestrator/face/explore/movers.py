@@ -49,8 +49,9 @@ def movers(
     Returns
     -------
     dict
-        ``movers`` (see `_as_json`; at most `MOST`, largest effect first), ``frequency_hz`` and ``damping_percent`` of
-        the mode, ``looked_at`` and ``of``: how many values were looked at, and how many could be.
+        ``movers`` (see `_as_json`; at most `MOST`, those that move the mode furthest for the same percentage; first
+        the one whose step moves damping most, those with doubts last), ``frequency_hz`` and ``damping_percent`` of the
+        mode, ``looked_at`` and ``of``: how many values were looked at, and how many could be.
 
     Raises
     ------
@@ -72,8 +73,9 @@ def movers(
     least = _NO_EFFECT * abs(found.mode.eigenvalue)
     acting = [row for row in found.rows if row.derivative is not None and row.effect > least]
     trusted = sorted(acting, key=lambda row: bool(row.doubts))  # the order by effect stays
+    shown = [_as_json(row) for row in trusted[:MOST]]
     return {
-        "movers": [_as_json(row) for row in trusted[:MOST]],
+        "movers": sorted(shown, key=lambda one: (bool(one["doubts"]), -abs(one["points"]))),
         "frequency_hz": found.mode.frequency_hz,
         "damping_percent": found.mode.damping_percent,
         "looked_at": len(wanted),

@@ -36,6 +36,16 @@ def test_the_mode_is_the_least_damped_one_of_the_range():
     assert found["damping_percent"] == pytest.approx(least.damping_percent, rel=1e-9)
 
 
+def test_the_value_whose_step_moves_damping_most_comes_first():
+    """A load that moves the frequency further once stood above one that moves damping three times as much."""
+    scenario = gfor.load("kundur").scenario("pod_q")
+    loads = ["grid.load_7.scale", "grid.load_9.scale"]
+    found = movers(scenario, {}, RANGE, loads, lambda part: None)["movers"]
+    assert [one["parameter"] for one in found] == ["grid.load_9.scale", "grid.load_7.scale"]
+    assert abs(found[0]["points"]) > 2 * abs(found[1]["points"])
+    assert abs(found[0]["hertz"]) < abs(found[1]["hertz"])
+
+
 def test_what_is_off_or_zero_moves_nothing_and_is_not_looked_at():
     looked_at, of = candidates(gfor.load("two_area").scenario("gfor"), {})
     assert looked_at == of

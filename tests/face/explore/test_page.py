@@ -137,7 +137,7 @@ def test_map_table_and_verdict_are_those_of_the_command(view, capsys):
     headline = "SG + GFOR POD-P: stable (small-signal); least damped from 0.1 to 2 Hz: "
     verdict = view.locator("#verdict").inner_text()
     assert verdict.startswith(headline)
-    assert verdict.endswith("(sg1; sg2 at +127°)")  # as `gfor modes` says it
+    assert verdict.endswith("(sg1; sg2 leads by 127°)")  # as `gfor modes` says it
     assert said in view.locator("#verdict").inner_text()
     assert content["stability"]["sentence"] in view.locator("#outside span").inner_text()
     assert [row[:2] for row in rows(view)] == shown(content["modes"])
@@ -148,7 +148,7 @@ def test_map_table_and_verdict_are_those_of_the_command(view, capsys):
     mark.hover(force=True)
     assert "hover" in view.locator("#table tbody tr").first.get_attribute("class")
     mark.click(force=True)
-    assert "sg1; sg2 at +127°" in view.locator("#chosen").inner_text()
+    assert "sg1; sg2 leads by 127°" in view.locator("#chosen").inner_text()
     assert view.locator("#chosen .shape .arrow").count() == 2
     assert view.locator("#chosen meter").count() >= 5
     count = len(rows(view))
@@ -505,6 +505,9 @@ def test_a_refused_outage_and_a_search_that_cannot_act_say_so(browser):
             "#failure", has_text="not computed; what is shown is the state before"
         ).wait_for()
         assert view.locator("#element input[type=checkbox]").is_checked()
+        refused = view.locator("#element [role=alert]").inner_text()
+        assert refused  # in whole, and once: the line on top only says what is shown
+        assert view.locator("#failure").inner_text().endswith("what is shown is the state before")
         assert view.evaluate("$('element').scrollWidth <= $('element').clientWidth")  # a long path
         assert view.locator("#controls .control").count() == 0
         assert view.evaluate("state.values") == {}

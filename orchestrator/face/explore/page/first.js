@@ -74,7 +74,7 @@ function paintMovers(anew = false) {
   if (SAVED && !SAVED.movers) { $("movers-title").hidden = true; return; }
   if (!known) parts.push(make("p", { class: "soft" }, seen.moversReason || "The FMUs are being asked which values move this mode most …"));
   else if (!known.movers.length) parts.push(make("p", { class: "soft" }, seen.moversReason || `None of ${known.looked_at} values moves this mode.`));
-  else parts.push(make("p", { class: "soft" }, SAVED ? "Each slider moves alone, over values that were computed. " : `By ∂λ/∂p of the running FMUs; first the value that moves frequency and damping furthest for the same percentage${known.looked_at < known.of && !seen.moversAgain ? `; ${known.looked_at} of ${known.of} values were looked at` : ""}. `, seen.moversAgain && !SAVED ? again : null));
+  else parts.push(make("p", { class: "soft" }, SAVED ? "Each slider moves alone, over values that were computed. " : `By ∂λ/∂p of the running FMUs: the values that move frequency and damping furthest for the same percentage, first the one whose step moves damping most${known.looked_at < known.of && !seen.moversAgain ? `; ${known.looked_at} of ${known.of} values were looked at` : ""}. `, seen.moversAgain && !SAVED ? again : null));
   const boxes = parts.slice(0, shown.length);
   if (boxes.some((box, k) => $("movers").children[k] !== box) || $("movers").children.length !== parts.length) { $("movers").replaceChildren(...parts); return; }
   $("movers").lastElementChild.replaceWith(parts.at(-1));

@@ -205,7 +205,7 @@ async function setOnes(values, error) {
   if (!error.textContent) return;
   state.controls = before;
   keepState(); paintControls();
-  paintElementAgain(error.textContent);
+  paintElementAgain(error === $("failure") ? "" : error.textContent);
 }
 function paintElementAgain(text) { paintElement(); $("element").querySelector("[role=alert]").textContent = text; }
 

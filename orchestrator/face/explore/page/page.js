@@ -15,7 +15,7 @@ async function compute(place = null) {
     seen.estimate = null;
     if (seen.answer) { paintVerdict(); paintMap(); paintTable(); paintControls(); }
     const error = name && document.querySelector(`.control[data-name="${CSS.escape(name)}"] .error`);
-    if (error) error.textContent = why; else if (place && why) failed(`not computed; what is shown is the state before: ${reasonOf(why)}`);
+    if (error) error.textContent = why; else if (place && why) failed(`not computed; what is shown is the state before${place.closest("#element") ? "" : `: ${reasonOf(why)}`}`);
     return false;
   }
   seen.computed = { scenario: asked.scenario, values: asked.values, events: asked.events, range: asked.range };
@@ -50,8 +50,13 @@ function paintVerdict() {
   const least = leastOf(seen.modes), [low, high] = state.range;
   const swing = least ? `least damped from ${number(low)} to ${number(high)} Hz: ${fixed(least.frequency_hz, 3)} Hz, ${fixed(least.damping_percent, 2)} % (${swingers(seen.modes.indexOf(least), 3) || Object.keys(least.components).slice(0, 2).join(", ")})` : `no oscillation from ${number(low)} to ${number(high)} Hz`;
   $("verdict").textContent = `${titleNow()}: ${one.stable === true ? "stable" : one.stable === false ? "UNSTABLE" : "not known"} (small-signal); ${swing}`;
-  $("outside").querySelector("span").textContent = [`${seen.answer.verdict}.`, seen.answer.outside && `${seen.answer.outside}.`, ...(seen.answer.warnings ?? one.warnings).map(text => `Warning: ${text}`)].filter(Boolean).join(" ");
+  paintOutside();
   $("wider").hidden = Boolean(SAVED) || !seen.answer.outside || state.range[1] >= 1000;
+}
+// The whole spectrum's verdict; `at` says of which state it is, where the headline is of another.
+function paintOutside(at = "") {
+  const { verdict, outside } = seen.answer, warnings = seen.answer.warnings ?? seen.answer.modes.scenarios[0].warnings;
+  $("outside").querySelector("span").textContent = [`${at}${verdict}.`, outside && `${outside}.`, ...warnings.map(text => `Warning: ${text}`)].filter(Boolean).join(" ");
 }
 async function loadInfo() {
   const asked = state.scenario, empty = await ask("parameters", { ask: "parameters", scenario: asked, values: {} });

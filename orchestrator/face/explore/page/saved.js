@@ -46,6 +46,7 @@ async function dragSaved(name, value) {
   $("verdict").className = "estimated";
   const most = `any drawn mode by at most ${number(cell.most, 2)}${cell.least > cell.most ? "; a mode that is not drawn is damped least there" : ""}`;
   const off = `${number(cell.least, 2)} points${cell.hertz === undefined ? "" : ` and ${fixed(cell.hertz, 4)} Hz`}`;
+  paintOutside(`Computed nearby, with ${name} = ${number(heldNear(name, value))}: `);
   $("verdict").textContent = estimated(name, value, least, 2, `between computed values, halfway off by ${off}, ${most}`);
   painted(begin, "estimate");
 }

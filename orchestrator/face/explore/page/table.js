@@ -66,8 +66,9 @@ function bars(title, entries) {
 function swingers(place, most = 6) {
   const [together, against, between = {}] = seen.answer.swings?.[place] ?? [[], []];
   const few = units => `${units.slice(0, most).join(", ")}${units.length > most ? ` and ${units.length - most} more` : ""}`;
-  const others = few(Object.entries(between).map(([name, angle]) => `${name} at ${angle > 0 ? "+" : ""}${fixed(angle, 0)}°`));
-  return [[together, against].filter(side => side.length).map(few).join(" against "), others].filter(Boolean).join("; ");
+  const others = few(Object.entries(between).map(([name, angle]) => `${name} ${angle > 0 ? "leads" : "lags"} by ${fixed(Math.abs(angle), 0)}°`));
+  const sides = [together, against].filter(side => side.length), alone = together.length === 1 && !against.length && !others;
+  return [sides.map(few).join(" against ") + (alone ? " alone" : ""), others].filter(Boolean).join("; ");
 }
 let turning = null;
 function paintChosen() {

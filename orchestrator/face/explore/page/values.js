@@ -263,10 +263,11 @@ function estimateAt(name, value) {
   const least = modes.filter(Boolean).sort((a, b) => a.damping - b.damping)[0];
   $("verdict").className = "estimated";
   if (least) $("verdict").textContent = estimated(name, value, least, 1, "by ∂λ/∂p");
+  paintOutside(`Computed before, with ${name} = ${number(state.values[name] ?? original(name))}: `);
   painted(begin, "estimate");
 }
 // The verdict while a slider is dragged, in a live page and in a saved one.
-const estimated = (name, value, least, digits, how) => `${name} = ${number(value)}: least damped ≈ ${fixed(least.hz, 3)} Hz, ${fixed(least.damping, digits)} % (estimated ${how}); computed on release`;
+const estimated = (name, value, least, digits, how) => `${name} = ${number(value)}: least damped ≈ ${fixed(least.hz, 3)} Hz, ${fixed(least.damping, digits)} % (estimated ${how}); ${SAVED ? "the nearest computed value" : "computed"} on release`;
 // How long it took from the input until the map was painted.
 function painted(begin, what) {
   requestAnimationFrame(() => setTimeout(() => {
