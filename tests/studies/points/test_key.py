@@ -52,31 +52,55 @@ def tree(tmp_path_factory):
     )
 
 
+@pytest.fixture(scope="module")
+def compiled():
+    """Module, file → its code, compiled once for each text: most files never change here."""
+    compile_anew = code._code.__wrapped__
+    found = {}
+
+    def find(name, file):
+        key = name, file.read_bytes()
+        if key not in found:
+            found[key] = compile_anew(name, file)
+        return found[key]
+
+    return find
+
+
 @pytest.fixture
-def named(fresh, monkeypatch, tree):
+def named(fresh, monkeypatch, tree, compiled):
     """Module → the name of a point of its, as a new process finds it."""
     monkeypatch.setattr(code, "_ROOT", tree)
+    monkeypatch.setattr(code, "_code", compiled)
     # Python would take what it compiled of another text of that size in the same second
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
 
     def find(module):
-        for one in (code_hash, numbers_hash, code._code):
+        for one in (code_hash, numbers_hash):
             one.cache_clear()
         return key_of({"a": 1}, module)
 
     return find
 
 
+@pytest.fixture(scope="module")
+def usual():
+    """Module → the name of a point of its in the tree as it is."""
+    return {}
+
+
 @pytest.fixture
-def changed(named, tree):
+def changed(named, tree, usual):
     """Whether points of a module have other names once a file has another text."""
 
     def find(module, file, old, new):
-        before, text = named(module), (tree / file).read_text(encoding="utf-8")
+        text = (tree / file).read_text(encoding="utf-8")
+        if module not in usual:
+            usual[module] = named(module)
         assert text.count(old) == 1
         (tree / file).write_text(text.replace(old, new), encoding="utf-8")
         try:
-            return named(module) != before
+            return named(module) != usual[module]
         finally:
             (tree / file).write_text(text, encoding="utf-8")
 
