@@ -14,7 +14,7 @@ from typing import Any
 from fmus.toolchain.extras import SetupError
 from orchestrator.core.errors import INTERRUPTED, TERMINATED, CosimError, InputError
 from orchestrator.core.interrupts import calls
-from orchestrator.core.late import import_xarray_alone
+from orchestrator.core.late import import_xarray_alone, put_off_parts_of_numpy
 from orchestrator.core.safe_files import inputs, spare_input
 from orchestrator.core.spelling import as_options
 from orchestrator.face.cli.interrupted import ending, is_interrupt
@@ -58,6 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns 0, 1 for a failure during a run, 2 for input that cannot be used."""
     words = sys.argv[1:] if arguments is None else list(arguments)
     _print_anything()
+    put_off_parts_of_numpy()
     with calls.terminable(ending=arguments is None), as_options():
         code = _run(words)
     return TERMINATED if calls.terminated and code == INTERRUPTED else code
