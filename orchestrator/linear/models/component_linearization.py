@@ -168,9 +168,12 @@ def _from_perturbation(
         return StepMap(after[:, :n], by_input(after), outputs[:p, :n], by_input(outputs[:p]))
 
     small, large = found.small, found.large
-    one, other = step_map(small.after, small.outputs), step_map(large.after, large.outputs)
+    one = other = step_map(small.after, small.outputs)
+    if large.after is not small.after or large.outputs is not small.outputs:
+        other = step_map(large.after, large.outputs)
     disagreement = max(
-        float(np.abs(a - b).max(initial=0.0)) for a, b in zip(one, other, strict=True)
+        0.0 if a is b else float(np.abs(a - b).max(initial=0.0))
+        for a, b in zip(one, other, strict=True)
     )
     one_sided = without_curvature(
         (small.after_up, small.outputs_up), (large.after_up, large.outputs_up)

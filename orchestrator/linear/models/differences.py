@@ -245,16 +245,20 @@ class _Turns:
         """Central difference quotients, and those of the first direction alone; a row for each variable."""
         count, first, both = len(self.first), self.first[:, None], self.both
         at_rest = at_rest[..., None, :]
-        other = np.empty((*answers.shape[:-2], count, answers.shape[-1]))
-        other[:] = at_rest
-        other[..., both, :] = answers[..., count:, :]
         width = self.sizes.copy()
         width[..., both] *= 2
-        central = np.subtract(answers[..., :count, :], other, out=other)
-        central *= first
-        central /= width[..., None]
+        if len(both) == count:
+            central = answers[..., :count, :] - answers[..., count:, :]
+        else:
+            other = np.empty((*answers.shape[:-2], count, answers.shape[-1]))
+            other[:] = at_rest
+            other[..., both, :] = answers[..., count:, :]
+            central = np.subtract(answers[..., :count, :], other, out=other)
         one_sided = answers[..., :count, :] - at_rest
-        one_sided *= first
+        if (first != 1).any():
+            central *= first
+            one_sided *= first
+        central /= width[..., None]
         one_sided /= self.sizes[..., None]
         return central, one_sided
 

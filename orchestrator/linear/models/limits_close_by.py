@@ -5,7 +5,7 @@ that meets it upwards and not downwards is one-sided: a linear model then takes 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,11 +55,14 @@ class AnswersOfSize:
 
     def _apart(self, other: Answer, share: float) -> Columns:
         """Columns in which an answer differs from the first by more than a share of what is there."""
-        far = [
-            (np.abs(a - b) > share * (np.abs(a) + floor)).any(axis=-2)
-            for a, b, floor in zip(self.once, other, self.floors, strict=True)
-        ]
-        return np.asarray(far[0] | far[1])
+        first = self.once[0]
+        far = np.zeros((*first.shape[:-2], first.shape[-1]), dtype=bool)
+        for a, b, floor in zip(self.once, other, self.floors, strict=True):
+            for some in () if a is b else _columns(a):
+                size = np.abs(a[..., some])
+                apart = np.abs(a[..., some] - b[..., some]) > share * (size + floor)
+                far[..., some] |= apart.any(axis=-2)
+        return far
 
 
 class OneSidedColumns:
@@ -67,7 +70,9 @@ class OneSidedColumns:
 
     def __init__(self, first: AnswersOfSize, size: float) -> None:
         self.now = first.uneven
-        self._distant = self.now & (_movement(first.once) * size > _FAR)
+        self._distant = self.now.copy()
+        if self.now.any():
+            self._distant &= _movement(first.once) * size > _FAR
 
     def take_back(self, columns: Sequence[int], smaller: AnswersOfSize) -> None:
         """Take back those that a smaller size answers evenly, where the larger one went to a limit far away."""
@@ -77,7 +82,21 @@ class OneSidedColumns:
 
 def _movement(answer: Answer) -> Vector:
     """Return the largest movement per unit in each column of an answer, of the states or of the outputs."""
-    return np.asarray(np.abs(np.concatenate(answer, axis=-2)).max(axis=-2, initial=0.0))
+    largest = np.zeros((*answer[0].shape[:-2], answer[0].shape[-1]))
+    for part in answer:
+        for some in _columns(part):
+            movement = np.abs(part[..., some]).max(axis=-2, initial=0.0)
+            largest[..., some] = np.maximum(largest[..., some], movement)
+    return largest
+
+
+_TOGETHER = 64
+"""Columns that are looked at together: those of a large network would leave the processor's cache between two looks."""
+
+
+def _columns(matrix: Matrix) -> Iterator[slice]:
+    for first in range(0, matrix.shape[-1], _TOGETHER):
+        yield slice(first, first + _TOGETHER)
 
 
 def without_curvature(once: Answer, twice: Answer) -> Answer:
@@ -85,5 +104,5 @@ def without_curvature(once: Answer, twice: Answer) -> Answer:
 
     The curvature of something smooth adds a part that grows with the size, and it is gone here; a corner, or a limit
     within the sizes, stays."""
-    after, outputs = (2 * a - b for a, b in zip(once, twice, strict=True))
+    after, outputs = (a if a is b else 2 * a - b for a, b in zip(once, twice, strict=True))
     return after, outputs

@@ -51,10 +51,10 @@ def perturb(step: PerturbedStep, rates: Sequence[str], *, once: bool = False) ->
     found = differences_by_rates(step, PERTURBATIONS[0], with_slopes=bool(rates)) or _with_both(
         step, columns, PERTURBATIONS[0], rates
     )
-    usual = Differences(*(part.copy() for part in found[1]))
     answers = _answers(step, found, columns, PERTURBATIONS[0])
     one_sided = OneSidedColumns(answers, PERTURBATIONS[0])
     columns = _those_of(columns, answers.disagree)
+    usual = Differences(*(part.copy() for part in found[1])) if columns else found[1]
     narrow: dict[str, float] = {}
     for size in PERTURBATIONS[1:]:
         if not columns:
@@ -113,9 +113,10 @@ def _answers(
     small, large = pair
     at_rest = np.eye(len(step.states), len(step.names))[:, columns]
     floor = _SMALL * PERTURBATIONS[0] / size
+    change = small.after - at_rest
     return AnswersOfSize(
-        once=(small.after - at_rest, small.outputs),
-        twice=(large.after - at_rest, large.outputs),
+        once=(change, small.outputs),
+        twice=(change if large.after is small.after else large.after - at_rest, large.outputs),
         upwards=(small.after_up - at_rest, small.outputs_up),
         floors=(floor * step.step_size, floor),
     )
