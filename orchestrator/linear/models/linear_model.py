@@ -199,6 +199,8 @@ class LinearModel:
         return self.hub.near_at(sigma) if self.is_searched_in_blocks else self.hub.at(sigma)
 
 
+_ROWS = 64  # of a block that become sparse together: they stay in the processor's cache
+
 Indices = NDArray[np.int64]
 Places = NDArray[np.int32]
 
@@ -209,7 +211,7 @@ class Equations:
     def __init__(self, n: int, m: int) -> None:
         self._shapes = {"F": (n, n), "G": (n, m), "H": (m, n), "K": (m, m)}
         self._states = np.arange(n)
-        self._parts: dict[str, list[tuple[Places, Places, Matrix]]] = {
+        self._parts: dict[str, list[tuple[Indices, Places, Matrix]]] = {
             name: [] for name in self._shapes
         }
 
@@ -224,16 +226,8 @@ class Equations:
         self._add("K", rows, w, D)
 
     def _add(self, name: str, rows: Indices, columns: Indices, block: Matrix) -> None:
-        used = np.flatnonzero(block.any(axis=0))  # a large network has idle inputs
-        if len(used) < block.shape[1]:
-            block, columns = block[:, used], columns[used]
-        each = np.repeat(rows.astype(np.int32), block.shape[1])
-        of_each = np.tile(columns.astype(np.int32), len(rows))
-        values = block.ravel()
-        places = np.flatnonzero(values)
-        if len(places) < len(values):
-            each, of_each, values = each[places], of_each[places], values[places]
-        self._parts[name].append((each, of_each, values))
+        if block.size:
+            self._parts[name].append((rows.copy(), columns.astype(np.int32), block))
 
     def model(
         self,
@@ -258,9 +252,23 @@ class Equations:
         )
 
     def _matrix(self, name: str) -> sp.csr_array:
-        rows, columns, values = (
-            np.concatenate(part) for part in zip(*self._parts[name], strict=True)
-        )
-        found = sp.csr_array(sp.coo_array((values, (rows, columns)), shape=self._shapes[name]))
+        shape, parts = self._shapes[name], self._parts[name]
+        counts = np.zeros(shape[0], dtype=np.int64)
+        for rows, _, block in parts:
+            counts[rows] += np.count_nonzero(block, axis=1)
+        starts = np.concatenate([[0], np.cumsum(counts)])
+        columns, values = np.empty(starts[-1], dtype=np.int32), np.empty(starts[-1])
+        free = starts[:-1].copy()  # where the next number of each row goes
+        for rows, names, block in parts:
+            for first in range(0, len(rows), _ROWS):
+                own, some = rows[first : first + _ROWS], block[first : first + _ROWS]
+                row, column = np.nonzero(some)
+                before = np.searchsorted(row, np.arange(len(own)))
+                places = (free[own] - before)[row] + np.arange(len(row))
+                columns[places], values[places] = names[column], some[row, column]
+                free[own] += np.diff(before, append=len(row))
+        if starts[-1] <= np.iinfo(np.int32).max:
+            starts = starts.astype(np.int32)
+        found = sp.csr_array((values, columns, starts), shape=shape)
         found.sum_duplicates()
         return found
