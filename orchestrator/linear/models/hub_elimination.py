@@ -97,22 +97,44 @@ class HubEquations:
     rest: Places
 
     @cached_property
-    def quadrants(self) -> tuple[sp.csc_array, sp.csc_array, sp.csr_array, Matrix]:
-        """P, Q, R and T of the module's text, with σ = 0."""
-        upper, lower = self.whole[self.rest], self.whole[self.hub]
-        return (
-            upper[:, self.rest].tocsc(),
-            upper[:, self.hub].tocsc(),
-            lower[:, self.rest].tocsr(),
-            lower[:, self.hub].toarray(),
-        )
+    def quadrants(self) -> tuple[sp.csc_array, sp.csc_array]:
+        """P and Q of the module's text, with σ = 0."""
+        upper = self.whole[self.rest]
+        return upper[:, self.rest].tocsc(), upper[:, self.hub].tocsc()
 
     @cached_property
-    def into_hub(self) -> tuple[Places, Matrix]:
-        """Columns of R that are not zero, and their dense matrix, column by column: nearly full, as they are."""
-        R = self.quadrants[2]
-        entered = np.unique(R.indices)
-        return entered, R[:, entered].toarray(order="F")
+    def entered(self) -> Places:
+        """Columns of R that are not zero."""
+        taken = np.zeros(self.whole.shape[1], dtype=bool)
+        for columns, _ in self._equations_of_hub():
+            taken[columns] = True
+        return np.flatnonzero(taken[self.rest])
+
+    @cached_property
+    def whole_hub(self) -> tuple[Matrix, Matrix]:
+        """T, and of R the columns that are not zero, column by column: nearly full, as they are."""
+        T, R = self._dense_hub()
+        return T, np.asfortranarray(R)
+
+    def _dense_hub(self) -> tuple[Matrix, Matrix]:
+        """The same, row by row, as the equations are kept: many millions of numbers, each looked at once."""
+        h, k = len(self.hub), len(self.entered)
+        T, R = np.zeros((h, h)), np.zeros((h, k))
+        place = np.full(self.whole.shape[1], -1)
+        place[self.rest[self.entered]], place[self.hub] = np.arange(k), k + np.arange(h)
+        for row, (columns, values) in enumerate(self._equations_of_hub()):
+            places = place[columns]
+            of_hub = places >= k
+            T[row, places[of_hub] - k] = values[of_hub]
+            R[row, places[~of_hub]] = values[~of_hub]
+        return T, R
+
+    def _equations_of_hub(self) -> Iterator[tuple[Places, Vector]]:
+        """Yield the columns and the numbers of each equation."""
+        starts = self.whole.indptr
+        for row in self.hub.tolist():
+            own = slice(starts[row], starts[row + 1])
+            yield self.whole.indices[own], self.whole.data[own]
 
     @cached_property
     def blocks(self) -> tuple[int, Places]:
@@ -143,20 +165,19 @@ class HubEquations:
     @cached_property
     def divided(self) -> DividedHub | None:
         """The hub in halves; None where that is not worth while."""
-        _, Q, _, T = self.quadrants
+        Q, (T, R) = self.quadrants[1], self._dense_hub()
         count, block = self.blocks
         entries = Q.tocoo()
         rows, columns = block[entries.coords[0]], count + entries.coords[1]
         ties = sp.coo_array((np.ones(len(rows)), (rows, columns)), shape=2 * (count + len(T),))
         _, group = sp.csgraph.connected_components(ties, directed=False)
-        entered, dense = self.into_hub
-        owner, taker = group[count:], group[block[entered]]
+        owner, taker = group[count:], group[block[self.entered]]
         # what no equation of the hub moves belongs to the one that takes most of it
         still = ~np.isin(taker, owner)
-        taker[still] = owner[np.abs(dense[:, still]).argmax(axis=0)]
+        taker[still] = owner[np.abs(R[:, still]).argmax(axis=0)]
         numbers = np.unique(owner)
         owner, taker = (np.searchsorted(numbers, of) for of in (owner, taker))
-        return divide(T, dense, self.hub < self.states, owner, taker)
+        return divide(T, R, self.hub < self.states, owner, taker)
 
     def at(self, sigma: complex) -> "HubFactors | None":
         """Factorise at σ; None where σ is so close to an eigenvalue of a block that the answer would be inaccurate."""
@@ -164,12 +185,13 @@ class HubEquations:
         if found is None:
             return None
         blocks, inside = found
-        schur = self.quadrants[3].astype(np.result_type(inside.dtype, sigma), order="F")
+        T, R = self.whole_hub
+        schur = T.astype(np.result_type(inside.dtype, sigma), order="F")
         among = np.flatnonzero(self.hub < self.states)
         schur[among, among] -= sigma
         self._take_in_columns(inside, schur)
         lu = scipy.linalg.lu_factor(schur, overwrite_a=True, check_finite=False)
-        factors = HubFactors(self, sigma, blocks, inside, DenseHub(lu, self.into_hub[1]))
+        factors = HubFactors(self, sigma, blocks, inside, DenseHub(lu, R))
         return factors if next(factors.left_over(self._trial(schur.dtype))) <= _ACCURATE else None
 
     def near_at(self, sigma: complex) -> "HubFactors | None":
@@ -189,7 +211,7 @@ class HubEquations:
         if self.divided is None or found is None:
             return None
         blocks, inside = found
-        hub = self.divided.at(sigma, inside[self.into_hub[0]])
+        hub = self.divided.at(sigma, inside[self.entered])
         return HubFactors(self, sigma, blocks, inside, hub)
 
     def _trial(self, kind: np.dtype) -> Vector:
@@ -197,8 +219,8 @@ class HubEquations:
 
     def _take_in_columns(self, inside: sp.csc_array, schur: Matrix) -> None:
         """Subtract R·inside in place: a few whole columns of R for each, as no sparse product takes them."""
-        entered, dense = self.into_hub
-        turned = sp.csr_array(inside[entered].T)
+        dense = self.whole_hub[1]
+        turned = sp.csr_array(inside[self.entered].T)
         if not np.iscomplexobj(schur):
             schur -= (turned @ dense.T).T
             return
@@ -214,7 +236,7 @@ class HubEquations:
         blocks = self.separate.at(sigma)
         if blocks is None:
             return None
-        P, Q = self.quadrants[:2]
+        P, Q = self.quadrants
         kind = np.result_type(P.dtype, sigma)
         colour, owner = self.colours
         _, block = self.blocks
@@ -288,7 +310,7 @@ class HubFactors:
     def _solve(self, b: Vector) -> Vector:
         e = self.equations
         x = self.blocks.solve(b[e.rest])
-        y = self.port.solve(b[e.hub] - self.port.taken_in(x[e.into_hub[0]]))
+        y = self.port.solve(b[e.hub] - self.port.taken_in(x[e.entered]))
         found = np.empty_like(b)
         found[e.rest], found[e.hub] = x - self.inside @ y, y
         return found
@@ -298,7 +320,7 @@ class HubFactors:
         beside = (self.inside.T @ b[e.rest].conj()).conj()
         y = self.port.solve_adjoint(b[e.hub] - beside)
         rest = b[e.rest]
-        rest[e.into_hub[0]] -= self.port.given_out(y)
+        rest[e.entered] -= self.port.given_out(y)
         found = np.empty_like(b)
         found[e.rest], found[e.hub] = self.blocks.solve(rest, "H"), y
         return found
@@ -328,7 +350,8 @@ def hub_equations(
     """The equations with their hub; None where there is no hub worth setting apart."""
     n = F.shape[0]
     taken = _places_taken(G, K)
-    G, H, K = G[:, taken], H[taken], K[taken][:, taken]
+    if len(taken) < K.shape[0]:
+        G, H, K = G[:, taken], H[taken], K[taken][:, taken]
     whole = sp.block_array([[F, G], [H, K - sp.eye_array(len(taken))]], format="csr")
     busy = np.diff(whole.indptr) > BUSY
     if busy.sum() < LEAST_HUB:
@@ -340,9 +363,12 @@ def hub_equations(
 
 def _places_taken(G: sp.csr_array, K: sp.csr_array) -> Places:
     """Places in w of what reaches a next state, at once or through other values."""
-    reached = np.asarray(abs(G).sum(axis=0)).ravel() > 0
-    while True:
-        more = reached | (np.asarray(abs(K[reached]).sum(axis=0)).ravel() > 0)
-        if (more == reached).all():
-            return np.flatnonzero(reached)
-        reached = more
+    reached = np.zeros(G.shape[1], dtype=bool)
+    reached[G.indices[G.data != 0]] = True
+    new = reached.copy()
+    while new.any():
+        of_new = np.repeat(new, np.diff(K.indptr)) & (K.data != 0)
+        more = reached.copy()
+        more[K.indices[of_new]] = True
+        new, reached = more & ~reached, more
+    return np.flatnonzero(reached)
