@@ -274,7 +274,7 @@ def main() -> None:
     parser.add_argument("--check", action="store_true", help="compare with the dense eigenvalues")
     parser.add_argument(
         "--native",
-        default="sg*,gfor*",
+        default="*",
         help="patterns of components that are compiled without Python",
     )
     parser.add_argument(
