@@ -19,12 +19,18 @@ _FIRST = 0.1  # part of the recording that is looked at for what is usual before
 _LONGEST_FIRST = 1.0  # [s]
 _SHORTEST_FIRST = 0.2  # time [s] before an event within the first part that shows a steady state
 _BACK = 0.5  # time [s] for which an event's slow begin is looked for before it is abrupt
+_LATE = 0.15  # time [s] by which a slow begin is late at most where it stands out of the scatter
 _STARTS = 5.0  # times the scatter before, from which on a deviation is the event's begin
 _LEAST_STARTS = 5e-4  # smallest such deviation [pu]
 _EXCURSION = 0.1  # deviation of the magnitude [pu] for which a dip or swell lasts
 _LONGEST_EVENT = 3.0  # dips last no longer [s]; what comes later is another one
 _SHORTEST = 0.1  # an event without a dip lasts so long [s], for its window
 _SAME = 1e-9  # times that are less apart [s] are one
+_SLOW = (0.1, 0.3)  # times [s] over which a signal bends in an event that is nowhere abrupt
+_SMOOTHED = 0.25  # part of such a time over which means are taken first
+_GROWS = 2  # lags that pass from a slow event's begin until its change is abrupt
+_BENDS_BEFORE = 0.5  # time [s] before the earliest begin that shows a straight line
+_CANDIDATES = 100  # begins that are compared, and three times as many samples
 _LASTS = 0.3  # part of the largest change over the lag, from which on a change is still the event
 
 
@@ -58,7 +64,7 @@ class Windows:
 def find_windows(recording: Recording) -> Windows:
     """By the first abrupt change of the voltage, or of the power where the voltage has none.
 
-    If none stands out from the first part, the event may lie within it."""
+    If none stands out from the first part, the event may lie within it, or be slow."""
     first = _first(recording)
     for still in (_without_slope(recording.voltage, first), recording.power):
         found = _event(recording, still, first)
@@ -67,6 +73,10 @@ def find_windows(recording: Recording) -> Windows:
     shortest = max(5, round(_SHORTEST_FIRST / recording.interval))
     for still in (_without_slope(recording.voltage, shortest), recording.power):
         found = _early_event(recording, still, shortest, first)
+        if found is not None:
+            return Windows(*found, recording.length)
+    for still in (_without_slope(recording.voltage, first), recording.power):
+        found = _slow_event(recording, still, first)
         if found is not None:
             return Windows(*found, recording.length)
     third = recording.length / 3
@@ -128,6 +138,58 @@ def _early_event(
     return _begin_and_end(recording, still, steady, steady + 2 * lag)
 
 
+def _slow_event(recording: Recording, still: Complex, first: int) -> tuple[float, float] | None:
+    """An event that is nowhere abrupt, as a voltage that sinks for seconds or the begin of a swing."""
+    for time in _SLOW:
+        lag = max(1, round(time / recording.interval))
+        bends = _bends(still, lag)
+        if first <= 2 * lag + 1:
+            continue
+        usual = float(bends[2 * lag : first].max())
+        seen = np.flatnonzero(bends[first:] > max(_ABOVE * usual, _LEAST))
+        if len(seen):
+            stop = first + int(seen[0])
+            begin = _bend(recording, still, (max(1, stop - 2 * lag), stop - 1), stop)
+            if begin < first:  # what swings before as well is no event
+                continue
+            change = _changes(still, _lag(recording))
+            end = _end(still, begin, change, _lag(recording), recording.interval)
+            return recording.interval * begin, recording.interval * min(end, len(still) - 2)
+    return None
+
+
+def _bends(still: Complex, lag: int) -> Numbers:
+    """How far each sample is off the line through those one lag and two lags before; means over a part of it."""
+    width = max(1, round(_SMOOTHED * lag))
+    total = np.concatenate([[0.0], np.cumsum(still)])
+    means = (total[width:] - total[:-width]) / width
+    found = np.zeros(len(still))
+    off = means[2 * lag :] - 2 * means[lag:-lag] + means[: -2 * lag]
+    found[2 * lag + width - 1 :] = np.abs(off)
+    return found
+
+
+def _bend(recording: Recording, still: Complex, within: tuple[int, int], stop: int) -> int:
+    """The sample within two at which a signal leaves its straight line along a parabola, by least squares."""
+    low, high = within
+    begin = max(0, low - round(_BENDS_BEFORE / recording.interval))
+    thin = max(1, (stop - begin) // (3 * _CANDIDATES))
+    rows = np.arange(begin, stop + 1, thin)
+    values = np.column_stack([still[rows].real, still[rows].imag])
+    line = np.vander(rows - begin, 2)
+    best = (np.inf, high)
+    for at in range(low, high + 1, max(1, (high - low) // _CANDIDATES)):
+        since = np.clip(rows - at, 0, None)
+        columns = np.column_stack([line, since, since**2])
+        rest = values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0]
+        best = min(best, (float(np.sum(rest**2)), at))
+    return best[1]
+
+
+def _changes(still: Complex, lag: int) -> Numbers:
+    return np.abs(still[lag:] - still[:-lag])
+
+
 def _begin_and_end(
     recording: Recording, still: Complex, earliest: int, stop: int
 ) -> tuple[float, float]:
@@ -135,6 +197,11 @@ def _begin_and_end(
     lag, interval = _lag(recording), recording.interval
     change = np.abs(still[lag:] - still[:-lag])
     begin = _begin(still, earliest, stop)
+    if stop - begin > _GROWS * lag:
+        is_seen = begin > max(earliest, 1)  # else it is further back
+        low = begin - round((_LATE if is_seen else _BACK) / interval)
+        low = max(low, min(begin, _first(recording)), 1)  # the first part is before any event
+        begin = _bend(recording, still, (low, begin if is_seen else stop - 1), stop)
     end = _end(still, begin, change, lag, interval)
     return interval * begin, interval * min(end, len(still) - 2)
 

@@ -10,9 +10,9 @@ from orchestrator.studies.validation.windows import find_windows
 LENGTH = 6.0  # [s]
 
 
-def windows(voltage, interval=1e-3, power=60.0, noise=2e-5):
+def windows(voltage, interval=1e-3, power=60.0, noise=2e-5, length=LENGTH):
     """Of a recording whose complex voltage [pu] is a function of time [s]."""
-    times = np.arange(0.0, LENGTH, interval)
+    times = np.arange(0.0, length, interval)
     random = np.random.default_rng(1)
     v = voltage(times) * (1 + noise * random.standard_normal(len(times)))
     columns = {
@@ -70,3 +70,31 @@ def test_a_swing_has_no_early_event_wherever_it_begins(hertz, phase):
 
 def test_noise_alone_has_no_event():
     assert not windows(lambda times: np.ones(len(times), complex), noise=3e-3).seen
+
+
+SLOW = {
+    "a voltage that sinks by 2 % in 2 s": lambda since: 1 - 0.01 * np.clip(since, 0, 2),
+    "a voltage that sinks towards 0.99": lambda since: 1 - 0.01 * (1 - np.exp(-since)),
+    "a frequency that falls by 50 mHz a second": lambda since: np.exp(
+        -1j * np.pi * 0.05 * np.clip(since, 0, 4) ** 2
+    ),
+    "a swing of 0.5 Hz": lambda since: np.exp(-0.05j * (1 - np.cos(np.pi * since))),
+    "a step of 0.08 % with a slow swing": lambda since: (
+        (1 - 0.0008 * (since > 0)) * np.exp(-0.035j * (1 - np.cos(0.6 * np.pi * since)))
+    ),
+}
+
+
+@pytest.mark.parametrize("noise", [2e-5, 2e-4])
+@pytest.mark.parametrize("interval", [1e-3, 0.02])
+@pytest.mark.parametrize("name", SLOW)
+def test_a_slow_or_small_event_is_found_where_it_begins(name, interval, noise):
+    """A load step far away moves the voltage by little at first."""
+    begin = 3.0
+
+    def voltage(times):
+        return SLOW[name](np.clip(times - begin, 0, None)) * np.ones(len(times), complex)
+
+    found = windows(voltage, interval, noise=noise, length=12.0)
+    assert found.seen
+    assert found.begin == pytest.approx(begin, abs=0.1 if noise > 1e-4 else 0.05)
