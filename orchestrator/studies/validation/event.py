@@ -11,6 +11,7 @@ import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.devices.fmi.port_mapping import BoundDescription
+from orchestrator.studies.validation.angle_jump import ask_of_angle_jump
 from orchestrator.studies.validation.device import OperatingStart, Played, PlayedDevice
 from orchestrator.studies.validation.figures import (
     SIGNALS,
@@ -26,6 +27,7 @@ from orchestrator.studies.validation.filled import Mask, runs_of
 from orchestrator.studies.validation.other_event import ask_of_other_event
 from orchestrator.studies.validation.out_of_step import step_loss
 from orchestrator.studies.validation.parameters import NEVER
+from orchestrator.studies.validation.plant_out_of_step import plant_loss
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.record import PortBases, Recording, questions_of_level
 from orchestrator.studies.validation.setpoint import ask_of_setpoint
@@ -46,6 +48,7 @@ _SUCH = 3  # times of a device that are named, which the samples do not show
 _SHORT_GAP = 0.02  # [s]: over a period voltages are means, and a gap hides little
 _IN_GAP = 0.3  # part of the largest change of the voltage, from which on a gap hides an event
 _FEWEST_BEFORE = 30  # samples before an event that a part of the recording keeps
+_ENDS = (QuestionKind.OUT_OF_STEP, QuestionKind.PLANT_OUT_OF_STEP, QuestionKind.ANGLE_JUMP)
 _OF_SAMPLES = ("voltage", "power", "good", "driven")
 
 
@@ -348,9 +351,22 @@ def _of_response(comparison: EventComparison) -> list[Question]:
     found += _assumed_bases(comparison.device)
     found += _slow_samples(comparison)
     found += _without_noise(comparison)
-    of_other = ask_of_other_event(event.recording, played.power) or _of_step(comparison)
+    of_other = _of_plant(comparison) or ask_of_other_event(event.recording, played.power)
+    of_other = of_other or _of_step(comparison)
     found += of_other or ask_of_setpoint(event.recording, event.windows, played.power)
     return found
+
+
+def _of_plant(comparison: EventComparison) -> list[Question]:
+    """An angle that jumps by itself, or a plant that falls out of step, which make the right model fall as well."""
+    event = comparison.event
+    recording = event.recording
+    jumps = ask_of_angle_jump(recording, comparison.played.power)
+    loss = plant_loss(recording, event.windows)
+    if jumps or loss is None:
+        return jumps
+    figures = {"at": recording.begin + loss.time, "turns": loss.turns}
+    return [Question(QuestionKind.PLANT_OUT_OF_STEP, figures)]
 
 
 def _of_step(comparison: EventComparison) -> list[Question]:
@@ -365,11 +381,15 @@ def _of_step(comparison: EventComparison) -> list[Question]:
 
 
 def in_step(comparison: EventComparison) -> EventComparison:
-    """The comparison up to where the model falls out of step; the same where it does not."""
+    """The comparison up to where the model falls out of step, the plant does, or the angle jumps by itself.
+
+    The same where none of them happens after the event's begin."""
     event = comparison.event
     for one in comparison.questions:
-        if one.kind is QuestionKind.OUT_OF_STEP:
+        if one.kind in _ENDS:
             at = float(one.figures["at"]) - event.recording.begin
+            if at <= event.windows.end:
+                return comparison
             return compare_with(comparison.device, cut_event(event, at - event.windows.begin))
     return comparison
 

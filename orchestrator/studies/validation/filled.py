@@ -26,7 +26,7 @@ def filled_samples(columns: Sequence[Numbers]) -> Mask:
     A simulation at rest, and one that comes to rest, repeat samples as well: those do not move beside them by more than
     numbers are rounded. Of a coarse resolution a run has to be longer than chance makes it."""
     still = np.all([np.diff(values) == 0 for values in columns], axis=0)
-    moving = np.any([_moves(values) for values in columns], axis=0)
+    moving = np.any([moves_in(values) for values in columns], axis=0)
     found = np.zeros(len(still) + 1, dtype=bool)
     runs = list(runs_of(still))
     long = sum(high - low for low, high in runs if high - low >= _FEWEST)
@@ -40,7 +40,7 @@ def filled_samples(columns: Sequence[Numbers]) -> Mask:
     return found
 
 
-def _moves(values: Numbers) -> Mask:
+def moves_in(values: Numbers) -> Mask:
     """Return which samples differ from the one before by more than numbers are rounded."""
     largest = np.nanmax(np.abs(values), initial=0.0)
     return np.asarray(~(np.abs(np.diff(values)) <= _ROUNDING * largest))

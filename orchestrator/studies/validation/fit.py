@@ -427,6 +427,8 @@ def _doubt(one: Adjustable, value: float, width: float) -> Untold | None:
 def _half_widths(best: _Trial, residuals: Residuals) -> dict[str, float]:
     """Half widths of the intervals of 95 %; the voltage between samples is one of the unknowns, and its moment a doubt.
 
+    So is its way between slow samples: each value may be off by as much as another way would move it.
+
     None if the fit was interrupted."""
     if best.slopes is None:
         return {}
@@ -441,6 +443,9 @@ def _half_widths(best: _Trial, residuals: Residuals) -> dict[str, float]:
         0
     ]
     widths = quantile * spread + np.abs(shift) + np.abs(gains).sum(axis=1)
+    for ways in residuals.of_other_voltages(best.values):
+        moved = np.linalg.lstsq(best.slopes, ways, rcond=None)[0]
+        widths = widths + np.abs(moved).max(axis=1)
     return {one.name: float(widths[k]) for k, one in enumerate(best.told)}
 
 

@@ -22,12 +22,14 @@ from orchestrator.studies.validation.event import (
     rms_error,
     rms_movement,
 )
+from orchestrator.studies.validation.lagged import ask_of_lag
 from orchestrator.studies.validation.lost_jump import lost_jump
 from orchestrator.studies.validation.magnitude import ask_of_magnitude
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.record import PortBases, Recording, at_port
 from orchestrator.studies.validation.transformer import AT_PORT, Between, Beyond
 
+_UNREADABLE = (QuestionKind.OTHER_EVENT, QuestionKind.ANGLE_JUMP, QuestionKind.STORED_TWICE)
 _OFF = (
     0.25  # part of the movement by which a response is off, from which on other readings are tried
 )
@@ -175,8 +177,8 @@ READINGS = (
 def question_readings(comparison: EventComparison, bases: PortBases) -> list[Question]:
     """Return what another reading of the recording, or another clock, would explain."""
     event = comparison.event
-    if any(one.kind is QuestionKind.OTHER_EVENT for one in comparison.questions):
-        return []  # no reading makes one event of two
+    if any(one.kind in _UNREADABLE for one in comparison.questions):
+        return []  # no reading makes one event of two, and none brings samples back
     error, moved = rms_error(comparison.played.power, event), rms_movement(event)
     scatter = (comparison.noise["p"].scatter, comparison.noise["q"].scatter)
     excess = [max(e * e - (_NOISY * n) ** 2, 0) ** 0.5 for e, n in zip(error, scatter, strict=True)]
@@ -189,7 +191,11 @@ def question_readings(comparison: EventComparison, bases: PortBases) -> list[Que
     if named:
         return named
     whole = math.hypot(*error)
-    explained = [*lost_jump(comparison), *_clock(comparison, whole)]
+    explained = [
+        *lost_jump(comparison),
+        *_clock(comparison, whole),
+        *ask_of_lag(comparison),
+    ]
     if whole > max(_LEAST_OFF, _OFF_ELSEWHERE * math.hypot(*moved)):
         explained += _meter_elsewhere(comparison, bases, whole)
         explained += _rated_otherwise(comparison, whole)

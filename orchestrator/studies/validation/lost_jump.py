@@ -1,11 +1,12 @@
-"""An angle that a recorder smoothed: integrated from a filtered frequency it lacks the jump that the plant felt.
+"""An angle or a magnitude that a recorder smoothed: it lacks the jump that the plant felt.
 
-The smoothing is taken back, by the derivative of the recorded angle, and the device runs again with the sharper one."""
+The smoothing is taken back, by the derivative of what was recorded, and the device runs again with the sharper one. An
+angle is smoothed where it was integrated from a filtered frequency, a magnitude in transducers of rms values."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,43 +28,65 @@ _BEFORE = 0.5  # part before it, the same [s]
 _LEAST = 0.003  # rms error in that part [pu] below which nothing is tried
 _OFF = 0.06  # part of the movement there that the error is at least
 _EXPLAINS = 0.4  # part of the error that a sharper angle may leave, to be named
-_SMALL = 0.03  # change of the angle [rad] that gives the part of the lost one: a shock says nothing of it
+_SMALL = 0.03  # change [rad, or part of 1] that gives the part of what was lost: a shock says nothing of it
 _PROMISES = 0.8  # part of the error that a straight line may leave, for a run to say what is left
-_ABRUPT = 0.005  # time [s] within which an angle jumps, and over which its derivative is taken
-_TIMES = 2.0  # times the recorded angle's fastest change, from which on the sharper one has a jump of its own
+_ABRUPT = 0.005  # time [s] within which a voltage jumps, and over which its derivative is taken
+_TIMES = 2.0  # times the recorded one's fastest change, from which on the sharper one has a jump of its own
+_LEAST_VOLTAGE = 0.05  # [pu] below which a magnitude says nothing of its smoothing
 _SHORTEST = 0.01  # smoothing over less [s] is none that matters
+
+
+Lost = Callable[[Numbers, float], Numbers]
+"""What a smoothing took away from values that are so far apart [s]."""
 
 
 @dataclass(frozen=True)
 class Smoothing:
-    """A way to smooth an angle over a time [s], and what it took away from the recorded one [rad]."""
+    """A way to smooth over a time [s], and what it took away from the recorded values."""
 
     length: float
-    lost: Callable[[Recording], Numbers]
+    lost: Lost
 
 
-def _lost_by_lag(length: float) -> Callable[[Recording], Numbers]:
+def _lost_by_lag(length: float) -> Lost:
     """A first-order lag: the time constant times the derivative."""
-    return lambda recording: length * _slope(recording)
+    return lambda values, interval: length * _slope(values, interval)
 
 
-def _lost_by_mean(length: float, ahead: float) -> Callable[[Recording], Numbers]:
+def _lost_by_mean(length: float, ahead: float) -> Lost:
     """A mean over so long, of which a part ``ahead`` comes after its time.
 
-    Its derivative is the difference of the angle at both ends over the length, so that each end gives the other."""
+    Its derivative is the difference of the values at both ends over the length, so that each end gives the other."""
 
-    def lost(recording: Recording) -> Numbers:
-        count = max(1, round(length / recording.interval))
+    def lost(values: Numbers, interval: float) -> Numbers:
+        count = max(1, round(length / interval))
         shift = round(ahead * count)
-        angle = np.unwrap(np.angle(recording.voltage))
-        moves = count * recording.interval * _slope(recording)
-        sharp = angle.copy()
-        for k in range(count, len(angle)):
+        moves = count * interval * _slope(values, interval)
+        sharp = values.copy()
+        for k in range(count, len(values)):
             at = k - shift
-            sharp[k] = sharp[k - count] + moves[at] if at < len(angle) else angle[k]
-        return np.asarray(sharp - angle)
+            sharp[k] = sharp[k - count] + moves[at] if at < len(values) else values[k]
+        return np.asarray(sharp - values)
 
     return lost
+
+
+def _angles(voltage: Complex) -> Numbers:
+    return np.asarray(np.unwrap(np.angle(voltage)))
+
+
+@dataclass(frozen=True)
+class SmoothedPart:
+    """A part of the voltage that a recorder may have smoothed.
+
+    ``way``: 1j or 1, by which a change of the part is one of the voltage's logarithm; ``unit``: of a change, as it is
+    told."""
+
+    name: str
+    kind: QuestionKind
+    values: Callable[[Complex], Numbers]
+    way: complex
+    unit: float
 
 
 SMOOTHINGS = (
@@ -76,10 +99,28 @@ SMOOTHINGS = (
 )
 
 
+SMOOTHINGS_OF_MAGNITUDE = (
+    Smoothing(0.1, _lost_by_lag(0.1)),
+    *(Smoothing(length, _lost_by_mean(length, 0.0)) for length in (0.04, 0.1)),
+    Smoothing(0.1, _lost_by_mean(0.1, 0.5)),
+)
+ANGLE = SmoothedPart("an angle", QuestionKind.LOST_JUMP, _angles, 1j, math.degrees(1.0))
+MAGNITUDE = SmoothedPart(
+    "a magnitude", QuestionKind.LOST_STEP, lambda voltage: np.log(np.abs(voltage)), 1 + 0j, 1.0
+)
+
+
 def lost_jump(comparison: EventComparison) -> Iterator[tuple[float, Question]]:
-    """A sharper angle that explains most of the error around the event's begin, with the part that it leaves."""
+    """A sharper angle, or magnitude, that explains most of the error around the event's begin, and what it leaves."""
+    for part, smoothings in ((ANGLE, SMOOTHINGS), (MAGNITUDE, SMOOTHINGS_OF_MAGNITUDE)):
+        yield from _lost(comparison, part, smoothings)
+
+
+def _lost(
+    comparison: EventComparison, part: SmoothedPart, smoothings: Sequence[Smoothing]
+) -> Iterator[tuple[float, Question]]:
     near = cut_event(comparison.event, _AFTER, _BEFORE)
-    if near.recording.instantaneous:
+    if near.recording.instantaneous or float(np.abs(near.recording.voltage).min()) < _LEAST_VOLTAGE:
         return
     power = comparison.near_power(near)
     error, moved = math.hypot(*rms_error(power, near)), math.hypot(*rms_movement(near))
@@ -88,36 +129,44 @@ def lost_jump(comparison: EventComparison) -> Iterator[tuple[float, Question]]:
     device = comparison.device.rough
     if device is not comparison.device:
         power = device.play(near.recording, near.start).power
-    found = [one for smoothing in SMOOTHINGS for one in _tried(device, near, power, smoothing)]
+    found = [
+        one for smoothing in smoothings for one in _tried(device, near, power, (part, smoothing))
+    ]
     if not found:
         return
     left, length, lost = min(found, key=lambda one: one[0])
-    angle = np.unwrap(np.angle(near.recording.voltage))
-    jumps = _fastest(angle + lost, near.recording) > _TIMES * _fastest(angle, near.recording)
+    values = part.values(near.recording.voltage)
+    jumps = _fastest(values + lost, near.recording) > _TIMES * _fastest(values, near.recording)
     if left > _EXPLAINS * error or not jumps:
         return
     figures = {
         "at": near.recording.begin + near.windows.begin,
         "length": length,
-        "jump": math.degrees(float(np.abs(lost).max())),
+        "jump": part.unit * float(np.abs(lost).max()),
         "error": error,
         "left": left,
     }
-    yield left / error, Question(QuestionKind.LOST_JUMP, figures)
+    yield left / error, Question(part.kind, figures)
 
 
 def _tried(
-    device: PlayedDevice, near: RecordedEvent, base: Complex, smoothing: Smoothing
+    device: PlayedDevice,
+    near: RecordedEvent,
+    base: Complex,
+    smoothed: tuple[SmoothedPart, Smoothing],
 ) -> Iterator[tuple[float, float, Numbers]]:
-    """The rms error left [pu], the likeliest length of the smoothing [s] and the lost angle.
+    """The rms error left [pu], the likeliest length of the smoothing [s] and what was lost.
 
-    ``base``: what the device does by the recorded angle. None if it cannot run, or a straight line promises too
+    ``base``: what the device does by the recorded voltage. None if it cannot run, or a straight line promises too
     little."""
     recording = near.recording
-    lost = smoothing.lost(recording)
+    of, smoothing = smoothed
+    lost = smoothing.lost(of.values(recording.voltage), recording.interval)
     part = min(1.0, _SMALL / max(float(np.abs(lost).max()), _SMALL))
-    with device.trials.trial(f"an angle smoothed over {1000 * smoothing.length:g} ms"):
-        moves = (device.play(_turned(recording, part * lost), near.start).power - base) / part
+    with device.trials.trial(f"{of.name} smoothed over {1000 * smoothing.length:g} ms"):
+        moves = (
+            device.play(_sharper(recording, of.way * part * lost), near.start).power - base
+        ) / part
         off = recording.power - base
         good = recording.good
         size = float(np.sum(np.abs(moves[good]) ** 2))
@@ -125,7 +174,7 @@ def _tried(
         promised = _rms((off - scale * moves)[good])
         if promised > _PROMISES * _rms(off[good]) or scale * smoothing.length < _SHORTEST:
             return
-        power = device.play(_turned(recording, scale * lost), near.start).power
+        power = device.play(_sharper(recording, of.way * scale * lost), near.start).power
         yield math.hypot(*rms_error(power, near)), scale * smoothing.length, scale * lost
 
 
@@ -133,23 +182,22 @@ def _rms(values: Complex) -> float:
     return float(np.sqrt(np.mean(np.abs(values) ** 2)))
 
 
-def _turned(recording: Recording, angle: Numbers) -> Recording:
-    return replace(recording, voltage=np.asarray(recording.voltage * np.exp(1j * angle)))
+def _sharper(recording: Recording, lost: Complex) -> Recording:
+    return replace(recording, voltage=np.asarray(recording.voltage * np.exp(lost)))
 
 
-def _lag(recording: Recording) -> int:
-    return max(1, round(_ABRUPT / recording.interval))
+def _lag(interval: float) -> int:
+    return max(1, round(_ABRUPT / interval))
 
 
-def _slope(recording: Recording) -> Numbers:
-    """The derivative of the recorded angle [rad/s], over a few milliseconds around each sample."""
-    angle = np.unwrap(np.angle(recording.voltage))
-    lag = _lag(recording)
-    low = np.clip(np.arange(len(angle)) - lag // 2, 0, len(angle) - 1)
-    high = np.clip(low + lag, 0, len(angle) - 1)
-    return np.asarray((angle[high] - angle[low]) / (lag * recording.interval))
+def _slope(values: Numbers, interval: float) -> Numbers:
+    """The derivative of recorded values [1/s], over a few milliseconds around each sample."""
+    lag = _lag(interval)
+    low = np.clip(np.arange(len(values)) - lag // 2, 0, len(values) - 1)
+    high = np.clip(low + lag, 0, len(values) - 1)
+    return np.asarray((values[high] - values[low]) / (lag * interval))
 
 
-def _fastest(angle: Numbers, recording: Recording) -> float:
-    lag = _lag(recording)
-    return float(np.abs(angle[lag:] - angle[:-lag]).max(initial=0.0))
+def _fastest(values: Numbers, recording: Recording) -> float:
+    lag = _lag(recording.interval)
+    return float(np.abs(values[lag:] - values[:-lag]).max(initial=0.0))

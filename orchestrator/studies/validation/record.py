@@ -25,6 +25,7 @@ from orchestrator.studies.validation.clipped import clipped_run
 from orchestrator.studies.validation.filled import Mask, filled_samples, runs_of
 from orchestrator.studies.validation.held_power import held_power
 from orchestrator.studies.validation.questions import Question, QuestionKind
+from orchestrator.studies.validation.stored_twice import stored_twice
 from orchestrator.studies.validation.transformer import AT_PORT, Between, Beyond
 
 if TYPE_CHECKING:
@@ -97,6 +98,7 @@ class Recording:
     # sample before a jump → part of the interval after which the voltage jumps; a straight line where none is given
     jumps: Mapping[int, float] = field(default_factory=dict)
     sampled: Complex | None = None  # the power before it was averaged
+    bends: bool = False  # whether a phasor runs along smooth curves between samples, and not along straight lines
 
     @property
     def times(self) -> Numbers:
@@ -138,8 +140,22 @@ class Recording:
             found: Complex = np.interp(times, self.times, self.voltage)
             return found
         angle = np.unwrap(np.angle(self.voltage))
-        magnitude = np.interp(times, self.times, np.abs(self.voltage))
-        return np.asarray(magnitude * np.exp(1j * np.interp(times, self.times, angle)))
+        along = _along_curves if self.bends else np.interp
+        magnitude = along(times, self.times, np.abs(self.voltage))
+        return np.asarray(magnitude * np.exp(1j * along(times, self.times, angle)))
+
+
+def _along_curves(times: Numbers, known: Numbers, values: Numbers) -> Numbers:
+    """Values between samples at even times, along cubics whose slopes are those of the samples beside each.
+
+    E. Catmull, R. Rom, A class of local interpolating splines, 1974."""
+    interval = known[1] - known[0]
+    slopes = np.gradient(values)
+    place = np.clip((times - known[0]) / interval, 0.0, len(known) - 1.0)
+    k = np.minimum(place.astype(int), len(known) - 2)
+    x = place - k
+    ends = (1 + 2 * x) * (1 - x) ** 2 * values[k] + x**2 * (3 - 2 * x) * values[k + 1]
+    return np.asarray(ends + x * (1 - x) ** 2 * slopes[k] + x**2 * (x - 1) * slopes[k + 1])
 
 
 def read_recording(
@@ -245,6 +261,7 @@ class _Reading:
 
     def ask_of_samples(self) -> None:
         """Ask about a channel that never moves, and about one sample that stands alone."""
+        self._ask_of_repeated_rows()
         for role, read in _IN_PER_UNIT.items():
             if role not in self.channels:
                 continue
@@ -278,6 +295,19 @@ class _Reading:
             if alone[most] > _SPIKE:
                 at = float(times[most + 1])
                 self.ask(QuestionKind.SPIKE, column=column, jump=float(alone[most]), at=at)
+
+    def _ask_of_repeated_rows(self) -> None:
+        columns = [
+            np.asarray(self.dataset[one.column].values, dtype=float)
+            for role, one in self.channels.items()
+            if role != "time"
+        ]
+        interval = float(np.median(np.diff(self.times)))
+        period = 1 / (self.bases.rated_hz * interval) if self.instantaneous else 0.0
+        block = stored_twice(columns, period)
+        if block is not None:
+            first, at = (float(self.times[k]) for k in (block.first, block.first + block.later))
+            self.ask(QuestionKind.STORED_TWICE, count=block.count, first=first, at=at)
 
     def _ask_of_still_angle(self) -> None:
         """Ask about an angle that never moves beside a magnitude that an instrument measured."""

@@ -16,9 +16,11 @@ from orchestrator.studies.validation.figures import correlation_length
 from orchestrator.studies.validation.hidden import (
     HiddenVoltage,
     hidden_voltages,
+    jumps_of,
     likelihoods,
     with_hidden,
 )
+from orchestrator.studies.validation.record import Recording
 
 Values = Mapping[str, float | bool]
 Report = Callable[[str], None]
@@ -27,6 +29,7 @@ LEAST_SCATTER = 2e-4
 """[pu]: a recording is not trusted more than an instrument of the best class."""
 
 _GAIN = 1e-3  # gain error of instruments of the best usual class, 0.1: no mean over samples takes it away
+_SLOW = 0.005  # interval between samples [s], from which on it matters what the voltage does between them
 _REFUSED = 1e3  # error, in scatters, of values with which the device does not run
 
 
@@ -103,6 +106,34 @@ class Residuals:
         self._made += len(self.stretches)
         return other.at(values) - self.at(values)
 
+    def of_other_voltages(self, values: Values) -> list[Matrix]:
+        """By how much the errors change with what else the voltage may have done between slow samples.
+
+        Two columns each, of which one may be true: all jumps right after the sample before or right before the one
+        after, and curves to either side of the straight lines. None for fast samples."""
+        here = self.at(values)
+        found = []
+        for changed in ((_jumps_at(0.0), _jumps_at(1.0)), (_along_curves,)):
+            columns = [self._errors_by(change, values) - here for change in changed]
+            if any(column.any() for column in columns):
+                found.append(np.column_stack(columns))
+        return found
+
+    def _errors_by(self, change: Callable[[RecordedEvent], Recording], values: Values) -> Numbers:
+        """Errors by voltages that are changed between samples, where these are slow."""
+        stretches = [
+            replace(one, event=replace(one.event, recording=change(one.event)))
+            if one.event.recording.interval >= _SLOW
+            else one
+            for one in self.stretches
+        ]
+        if all(one is other for one, other in zip(stretches, self.stretches, strict=True)):
+            return self.at(values)
+        other = Residuals(self.device, stretches, self.report)
+        other.hidden = self.hidden
+        self._made += len(self.stretches)
+        return other.at(values)
+
     def slopes(
         self, values: Values, steps: Mapping[str, float], *, both_sides: bool = True
     ) -> Matrix:
@@ -124,6 +155,17 @@ class Residuals:
             other = {**values, one.name: float(values.get(one.name, 0.0)) + one.scale}
             columns.append((self.at(other) - here) / one.scale)
         return np.column_stack(columns) if columns else np.empty((len(here), 0))
+
+
+def _jumps_at(part: float) -> Callable[[RecordedEvent], Recording]:
+    """A change of an event's voltage, which jumps after such a part of an interval."""
+    return lambda event: replace(
+        event.recording, jumps={sample: part for sample, _ in jumps_of(event)}
+    )
+
+
+def _along_curves(event: RecordedEvent) -> Recording:
+    return replace(event.recording, bends=True)
 
 
 def weighted(error: Complex, stretch: ErrorRows) -> Numbers:

@@ -186,6 +186,52 @@ def _lost_jump(x: Figures) -> str:
     )
 
 
+def _lost_step(x: Figures) -> str:
+    return (
+        f"the magnitude of the voltage lacks up to {x['jump']:.3g} pu from {x['at']:.4g} s on, as one that is smoothed "
+        f"over {1000 * x['length']:.3g} ms does; without that the error falls from {x['error']:.3g} to "
+        f"{x['left']:.3g} pu (rms): was it filtered by the recorder? Give the magnitude as it was measured, with "
+        "--channel 'v=COLUMN'"
+    )
+
+
+def _angle_jump(x: Figures) -> str:
+    return (
+        f"the angle jumps by {x['jump']:+.3g} deg at {x['at']:.4g} s, where the magnitude stays, and P and Q move by "
+        f"{x['seen']:.2g} pu, the model's by {x['asked']:.2g} pu: did the recorder take another reference for the "
+        "angle, or lose the time? What comes after is not judged. Give an angle without the jump, with --channel "
+        "'angle=COLUMN', or the part before, with " + Option.STOP
+    )
+
+
+def _stored_twice(x: Figures) -> str:
+    return (
+        f"{x['count']} samples in a row, from {x['first']:.4g} s on, come again to the last digit from {x['at']:.4g} s "
+        "on, which no instrument measures: was a block stored twice? Give the samples that were measured there, or the "
+        "part before, with " + Option.STOP + f" {x['at']:.4g}"
+    )
+
+
+def _lagged(x: Figures) -> str:
+    which = " and ".join(x["signals"]).upper().replace("AND", "and")
+    follows = "follow" if len(x["signals"]) > 1 else "follows"
+    return (
+        f"{which} {follows} the model's like one behind a lag of {1000 * x['lag']:.3g} ms, and beside that the error "
+        f"falls from {x['error']:.2g} to {x['left']:.2g} pu (rms): does the recorder filter it, or has the plant a lag "
+        "that the model lacks? Give it as it was measured, with --channel"
+    )
+
+
+def _plant_out_of_step(x: Figures) -> str:
+    return (
+        f"from {x['at']:.4g} s on the plant itself falls out of step: its current turns by {x['turns']:.2g} turns "
+        "beside its own voltage. When that happens hangs on what no recording holds, and the right model may fall a "
+        "little earlier, later or not at all: no error after it is judged. Give the part before, with "
+        + Option.STOP
+        + f" {x['at']:.4g}"
+    )
+
+
 def _start(x: Figures) -> str:
     return (
         f"at rest before the event the device feeds P = {x['p']:.4g}, Q = {x['q']:.4g} pu, and the plant fed "
@@ -368,6 +414,11 @@ _SENTENCES: Mapping[QuestionKind, Callable[[Figures], str]] = {
     QuestionKind.UNMEASURED: _unmeasured,
     QuestionKind.GAP_AT_EVENT: _gap_at_event,
     QuestionKind.LOST_JUMP: _lost_jump,
+    QuestionKind.LOST_STEP: _lost_step,
+    QuestionKind.ANGLE_JUMP: _angle_jump,
+    QuestionKind.STORED_TWICE: _stored_twice,
+    QuestionKind.LAGGED: _lagged,
+    QuestionKind.PLANT_OUT_OF_STEP: _plant_out_of_step,
     QuestionKind.START: _start,
     QuestionKind.READ_OTHERWISE: _read_otherwise,
     QuestionKind.POWER_HELD: _power_held,
@@ -603,11 +654,14 @@ def fit_sentence(fit: Fit, kept_back: Sequence[str]) -> str:
     if not fit.finished:
         said += ", interrupted: the best values so far, without intervals"
     if not fit.reached:
+        said += f"; the error that is left is {fit.error_after:.3g} times the scatter"
+    if not fit.reached and fit.finished:
         said += (
-            f"; the error that is left is {fit.error_after:.3g} times the scatter: another parameter is wrong, or the "
-            "fit ended at the wrong values. The intervals do not hold: start elsewhere, with --set"
+            ": another parameter is wrong, or the fit ended at the wrong values, or the samples hold too little of "
+            "what drove the plant. The intervals do not hold then: start elsewhere, with --set"
         )
     if kept_back:
         return f"{said}; {', '.join(kept_back)} was kept back from it, and the table says whether it agrees."
     said += "; no other event confirms it: give one with --hold-back."
-    return f"{said} Intervals hold if the model has the right form." if fit.reached else said
+    sure = fit.reached and fit.finished
+    return f"{said} Intervals hold if the model has the right form." if sure else said

@@ -1,14 +1,19 @@
 """Parameters that made a recording are found again, and what it cannot tell is named."""
 
 import json
+from types import SimpleNamespace
 
+import numpy as np
 import pandas as pd
 import pytest
 
 import orchestrator as gfor_in_python
 from orchestrator.core.errors import INTERRUPTED
+from orchestrator.studies.validation import fit
+from orchestrator.studies.validation.hidden import HiddenVoltage
+from orchestrator.studies.validation.parameters import Adjustable
 from tests.benchmarks.validation_draws import TRUTH, starts_of
-from tests.studies.validation.recordings import run, table, with_noise, written
+from tests.studies.validation.recordings import of_pmu, run, table, with_noise, written
 
 ON = {"pod_p.enabled": True}
 
@@ -107,8 +112,6 @@ def test_an_interrupted_fit_keeps_the_best_values_so_far(recording):
 
 
 def test_the_command_ends_an_interrupted_fit_with_its_figures(gfor, recording, monkeypatch):
-    from orchestrator.studies.validation import fit  # noqa: PLC0415 - its solver is replaced
-
     def stopped(residuals, told, switches, best):
         best.values = {"pod_p.K": 100.0}
         raise KeyboardInterrupt
@@ -118,3 +121,64 @@ def test_the_command_ends_an_interrupted_fit_with_its_figures(gfor, recording, m
     code, out, _ = gfor("validate", "gfor", str(recording), *options)
     assert code == INTERRUPTED
     assert json.loads(out)["fit"][0]["value"] == 100
+
+
+class CreepingErrors:
+    """Errors of scatter 1 with one parameter, and a hidden voltage whose last part is found by halves."""
+
+    def __init__(self, count=400):
+        random = np.random.default_rng(1)
+        self.noise = random.standard_normal(2 * count)
+        self.way = np.sin(np.arange(2 * count) / 20)
+        event = SimpleNamespace(recording=SimpleNamespace(interval=0.01))
+        self.stretches = [SimpleNamespace(rows=np.arange(count), event=event)]
+        self.hidden = [HiddenVoltage("hidden", 0, 0, 1 + 0j, 1.0)]
+        self.runs = 0
+
+    def report(self, text):
+        pass
+
+    def at(self, values):
+        self.runs += 1
+        creeps = (values.get("hidden", 0.0) - 1.0) ** 2
+        return np.append(self.noise + self.way * (values["K"] - 110.0), creeps)
+
+    def slopes(self, values, steps, *, both_sides=True):
+        return np.append(self.way, 0.0)[:, None]
+
+    def hidden_slopes(self, values):
+        slope = 2 * (values.get("hidden", 0.0) - 1.0)
+        return np.append(np.zeros(len(self.way)), slope)[:, None]
+
+
+def test_a_fit_ends_where_no_value_moves_any_more_by_what_it_is_uncertain(monkeypatch):
+    """By hand: K is a mean whose scatter is 1/|way|, and what is hidden creeps on without it."""
+    runs = {}
+    for gain in (fit._UNTOLD_GAIN, 0.0):
+        monkeypatch.setattr(fit, "_UNTOLD_GAIN", gain)
+        errors = CreepingErrors()
+        best = fit._Best()
+        told = [Adjustable("K", "1", start=80.0, low=0.0, high=1000.0)]
+        stage = fit._Stage(errors, 0.0, 1e-12, best, both_sides=True)
+        fit._stage_end(stage, told, {}, np.array([80.0 / told[0].reach, 0.0]))
+        runs[gain] = errors.runs
+        exact = 110.0 - float(errors.noise @ errors.way) / float(errors.way @ errors.way)
+        scatter = 1 / np.sqrt(float(errors.way @ errors.way))
+        assert abs(best.values["K"] - exact) < scatter / 7
+    assert runs[0.02] < 0.7 * runs[0.0]
+
+
+@pytest.mark.slow
+def test_an_interval_holds_what_the_voltage_may_do_between_slow_samples():
+    """A plant that swings through the fault of the other area, by means over a period, 50 of them in a second."""
+    fault = {"time": 1.0, "component": "grid", "type": "bus_fault", "bus": "bus_3"}
+    case = gfor_in_python.load("two_area_rms").with_(
+        events=[fault | {"X": 0.02, "duration": 0.1}],
+        solver={"step_size": "100 us", "record_interval": "1 ms", "record_filter": "low-pass"},
+    )
+    ran = case.scenario("pod_p", {"gfor.pod_p.K": 110.0}).run(stop=4.0).dataset
+    frame = of_pmu(with_noise(table(ran)), mean=20).set_index("time")
+    given = {"values": ON, "fit": "pod_p.K", "step": "1 ms"}
+    found = gfor_in_python.validate("gfor_phasor", frame, **given)
+    (row,) = found.fitted().itertuples()
+    assert row.low < 110 < row.high

@@ -3,6 +3,7 @@
 import re
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.signal import lfilter
 
@@ -88,6 +89,33 @@ def of_angle_behind_a_lag(frame, seconds=0.02):
     return frame.assign(angle_deg=behind)
 
 
+def lagged(frame, column, seconds):
+    """One column behind a first-order lag, as of a transducer."""
+    part = 1e-3 / seconds
+    first = frame[column][0]
+    return frame.assign(**{column: lfilter([part], [1, part - 1], frame[column] - first) + first})
+
+
+def with_angle_jump(frame, degrees, at=3.0):
+    return frame.assign(angle_deg=frame.angle_deg + degrees * (frame.time > at))
+
+
+def with_block_twice(frame, at, samples):
+    """A block that is stored again in place of the one after it."""
+    rows = np.arange(len(frame))
+    first = int(np.searchsorted(frame.time, at))
+    rows[first + samples : first + 2 * samples] -= samples
+    return frame.iloc[rows].reset_index(drop=True).assign(time=frame.time)
+
+
+def clipped(frame, column, upper=None, lower=None):
+    ends = {
+        name: None if part is None else frame[column].quantile(part)
+        for name, part in (("upper", upper), ("lower", lower))
+    }
+    return frame.assign(**{column: frame[column].clip(**ends)})
+
+
 def alone_beyond(frame, *columns):
     """The same, where some columns alone are measured beyond the transformer."""
     return frame.assign(**{name: beyond_transformer(frame)[name] for name in columns})
@@ -155,9 +183,31 @@ PLANTED = {
         "read otherwise",
     ),
     "Q has no sign": (lambda f: f.assign(q_mvar=f.q_mvar.abs()), "magnitude"),
-    "P ends at the recorder's range": (
-        lambda f: f.assign(p_mw=f.p_mw.clip(upper=f.p_mw.quantile(0.97))),
-        "clipped",
+    "P ends at the recorder's range": (lambda f: clipped(f, "p_mw", upper=0.97), "clipped"),
+    "P ends at the lower end of the range": (lambda f: clipped(f, "p_mw", lower=0.1), "clipped"),
+    "Q ends at the recorder's range": (lambda f: clipped(f, "q_mvar", upper=0.95), "clipped"),
+    "Q ends at the lower end of the range": (lambda f: clipped(f, "q_mvar", lower=0.05), "clipped"),
+    "Q alone is behind a lag of 20 ms": (lambda f: lagged(f, "q_mvar", 0.02), "behind a lag"),
+    "Q alone is behind a lag of 300 ms": (lambda f: lagged(f, "q_mvar", 0.3), "behind a lag"),
+    "P alone is behind a lag": (lambda f: lagged(f, "p_mw", 0.05), "behind a lag"),
+    "the magnitude is behind a lag of 20 ms": (
+        lambda f: lagged(f, "v_pu", 0.02),
+        "magnitude lacks a step",
+    ),
+    "the magnitude is behind a lag of 200 ms": (
+        lambda f: lagged(f, "v_pu", 0.2),
+        "magnitude lacks a step",
+    ),
+    "the angle jumps by 10 degrees": (lambda f: with_angle_jump(f, 10), "angle jumps alone"),
+    "the angle jumps back by 60 degrees": (lambda f: with_angle_jump(f, -60), "angle jumps alone"),
+    "the angle jumps in slow samples": (
+        lambda f: with_angle_jump(f, 30).iloc[::20],
+        "angle jumps alone",
+    ),
+    "50 ms are stored twice": (lambda f: with_block_twice(f, 2.0, 50), "stored twice"),
+    "a second of slow samples is stored twice": (
+        lambda f: with_block_twice(f.iloc[::20].reset_index(drop=True), 2.0, 50),
+        "stored twice",
     ),
     "Q was not recorded": (lambda f: f.assign(q_mvar=0.0), "channel does not move"),
     "one sample of P is wild": (
@@ -199,6 +249,64 @@ def test_a_planted_mistake_is_asked_about(good, name):
     (found,) = [one for one in questions if one["kind"] == kind]
     assert found["keeps_open"]
     assert found["figures"].get("reading", name) == name
+
+
+@pytest.mark.parametrize(
+    ("column", "seconds", "kind", "told"),
+    [
+        ("q_mvar", 0.05, "behind a lag", "lag"),
+        ("p_mw", 0.1, "behind a lag", "lag"),
+        ("v_pu", 0.1, "magnitude lacks a step", "length"),
+    ],
+)
+def test_the_time_of_a_lag_is_told(good, column, seconds, kind, told):
+    (found,) = asked(lagged(good, column, seconds))
+    assert found["kind"] == kind
+    assert found["figures"][told] == pytest.approx(seconds, rel=0.2)
+
+
+def test_a_jump_of_the_angle_is_told_with_its_size_and_time_and_nothing_beside_it(good):
+    (found,) = asked(with_angle_jump(good, -20))
+    assert found["figures"]["jump"] == pytest.approx(-20, abs=0.2)
+    assert found["figures"]["at"] == pytest.approx(3.0, abs=0.002)
+
+
+def test_a_jump_of_the_grids_own_angle_is_not_accused():
+    """The plant answers it."""
+    times = np.arange(0, 3, 1e-3)
+    angle = 5.7 - 8.0 * (times > 1.5)
+    stiff = {"v_pu": 1.0 + 0 * times, "angle_deg": angle, "p_mw": 900.0, "q_mvar": 0.0}
+    frame = pd.DataFrame({"time": times} | stiff)
+    own = gfor_in_python.validate("gfor", frame.set_index("time"), values=ON).curves()
+    power = {"p_mw": own["p_simulated"].to_numpy(), "q_mvar": own["q_simulated"].to_numpy()}
+    plant = frame.assign(**{name: 1500 * values for name, values in power.items()})
+    assert "angle jumps alone" not in [one["kind"] for one in asked(with_noise(plant))]
+    assert "angle jumps alone" in [one["kind"] for one in asked(with_noise(frame))]
+
+
+def test_a_block_that_is_stored_twice_is_told_with_its_times(good):
+    (found,) = asked(with_block_twice(good, 1.5, 100))
+    figures = found["figures"]
+    assert figures["count"] == 100
+    assert figures["first"] == pytest.approx(1.5, abs=0.0015)
+    assert figures["at"] == pytest.approx(1.6, abs=0.0015)
+
+
+def test_a_plant_that_falls_out_of_step_itself_leaves_no_verdict_on_its_own_model():
+    fault = {"time": 1.0, "component": "grid", "type": "bus_fault", "bus": "bus_2"}
+    deep = fault | {"X": 0.002, "duration": 0.25}
+    case = gfor_in_python.load("two_area").with_(
+        events=[deep], solver={"record_interval": "1 ms", "record_filter": "low-pass"}
+    )
+    frame = with_noise(table(case.scenario("pod_p").run(stop=3.0).dataset))
+    found = gfor_in_python.validate("gfor", frame.set_index("time"), values=ON, limits=EXAMPLE)
+    (question,) = [
+        one
+        for one in found.as_json()["events"][0]["questions"]
+        if one["kind"] == "plant out of step"
+    ]
+    assert 1.25 < question["figures"]["at"] < 2.9
+    assert found.verdict == "open"
 
 
 def test_a_good_recording_is_not_asked_about(good):
@@ -313,6 +421,12 @@ HONEST = {
     "samples are missing after the event": lambda f: without(f, 2.0, 2.1),
     "P is missing for a moment": lambda f: f.assign(p_mw=f.p_mw.mask(f.time.between(1.6, 1.65))),
     "a twentieth of the samples without a mean": lambda f: f.iloc[::20],
+    "the angle is wrapped and coarse": lambda f: f.assign(
+        angle_deg=((f.angle_deg + 179.5) % 360 - 180).round(2)
+    ),
+    "all channels are coarse": lambda f: f.round(
+        {"v_pu": 3, "angle_deg": 2, "p_mw": 0, "q_mvar": 0}
+    ),
     "a recorder of four digits": lambda f: f.round({"v_pu": 4, "angle_deg": 2, "p_mw": 1}),
 }
 
