@@ -164,9 +164,7 @@ def _tried(
     lost = smoothing.lost(of.values(recording.voltage), recording.interval)
     part = min(1.0, _SMALL / max(float(np.abs(lost).max()), _SMALL))
     with device.trials.trial(f"{of.name} smoothed over {1000 * smoothing.length:g} ms"):
-        moves = (
-            device.play(_sharper(recording, of.way * part * lost), near.start).power - base
-        ) / part
+        moves = (device.play(_sharper(recording, of, part * lost), near.start).power - base) / part
         off = recording.power - base
         good = recording.good
         size = float(np.sum(np.abs(moves[good]) ** 2))
@@ -174,7 +172,7 @@ def _tried(
         promised = _rms((off - scale * moves)[good])
         if promised > _PROMISES * _rms(off[good]) or scale * smoothing.length < _SHORTEST:
             return
-        power = device.play(_sharper(recording, of.way * scale * lost), near.start).power
+        power = device.play(_sharper(recording, of, scale * lost), near.start).power
         yield math.hypot(*rms_error(power, near)), scale * smoothing.length, scale * lost
 
 
@@ -182,8 +180,8 @@ def _rms(values: Complex) -> float:
     return float(np.sqrt(np.mean(np.abs(values) ** 2)))
 
 
-def _sharper(recording: Recording, lost: Complex) -> Recording:
-    return replace(recording, voltage=np.asarray(recording.voltage * np.exp(lost)))
+def _sharper(recording: Recording, part: SmoothedPart, lost: Numbers) -> Recording:
+    return replace(recording, voltage=np.asarray(recording.voltage * np.exp(part.way * lost)))
 
 
 def _lag(interval: float) -> int:
