@@ -117,8 +117,21 @@ def event_of(option: Option, text: str) -> EventInWords:
         raise InputError(option + f" {text!r}: {'; '.join(reasons)}") from error
 
 
+def _is_between_ends(at: str) -> bool:
+    """Return whether a word is a share of the way along a line that lies between its ends."""
+    try:
+        return 0 < to_unit(at, "1") < 1
+    except ValueError:
+        return False
+
+
 def _along_a_line(given: Mapping[str, str], along: re.Match[str]) -> dict[str, str]:
     """Return the keys of a fault along a line, from those of one at a bus."""
+    if not _is_between_ends(along["at"]):
+        raise ValueError(
+            f"at {along['at']!r}: along a line it is the share of the way from its from bus, such as 'at 30 %'; "
+            "a fault at an end of it is one at that bus, as in 'bus_9, 150 ms'"
+        )
     found = {key: word for key, word in given.items() if key not in ("bus", "cleared_by")}
     opened = given.get("cleared_by")
     if opened is not None and opened not in _OPENED:

@@ -374,6 +374,8 @@ def _unknown(event: Event, component: str, variable: str, plan: ComponentPlan) -
     if kind and wanted not in known:
         some = ", ".join(known[:12]) + (", …" if len(known) > 12 else "")
         hint = close_names(wanted, known, f"it has: {some}" if known else "it has none")
+        if isinstance(event, coupled.BusFault) and wanted in lines_among(names):
+            hint = f"it is a line: along it, a fault is at a share of the way, as in '{wanted} at 50 %, 100 ms'"
         return f"component {component!r} has no {kind} {wanted!r}; {hint}"
     settable = (*plan.description.parameters, *plan.description.inputs)
     hint = hint_at(plan.description, variable, settable, "")

@@ -69,6 +69,7 @@ def test_it_is_known_to_every_scenario_and_the_steady_state_does_not_see_it(tmp_
     ("text", "words"),
     [
         (FAULT.replace("b3", "b4"), "component 'grid' has no bus 'b4'; did you mean"),
+        (FAULT.replace("b3", "l31"), "it is a line: along it, .* as in 'l31 at 50 %, 100 ms'"),
         (FAULT + 'cleared_by = "l23"\n', "'cleared_by' needs 'duration'"),
         (
             FAULT + 'duration = "0.1 s"\ncleared_by = "l32"\n',

@@ -446,7 +446,10 @@ def test_faults_in_words(text, keys):
     [
         ("bus_9, 150 ms, recloses after 1 s", "'reclose_after' needs 'cleared_by'"),
         ("bus_9, 150 ms, 3-phase-earth", "kind = '3-phase-earth'; it must be '3-phase'"),
-        ("line_7_9 at 130 %, 100 ms", "at = '130 %'; it must be less than 1"),
+        ("line_7_9 at 130 %, 100 ms", "at '130 %': along a line it is the share of the way"),
+        ("line_7_9 at 30, 100 ms", "at '30': along a line it is the share of the way"),
+        ("line_7_9 at 0 %, 100 ms", "a fault at an end of it is one at that bus"),
+        ("line_7_9 at bus_7, 100 ms", "at 'bus_7': along a line it is the share of the way"),
         ("line_7_9 at 30 %, 100 ms, opens line_8", "'opens it' or 'opens one pole'"),
         ("line_7_9 at 30 %, 100 ms, opens one pole", "opens = 'pole' is for a fault of kind"),
     ],
