@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.studies.points.code import code_files, needed_modules
+from tests.support.source_files import product_files
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("fmus", "gfor_fmu", "orchestrator")
@@ -80,20 +81,20 @@ and keep folders."""
 
 @cache  # not while tests are collected: each worker of each run collects all
 def modules():
-    """Name → syntax tree of every module of the packages."""
-    found = {}
-    for package in PACKAGES:
-        for path in sorted((ROOT / package).rglob("*.py")):
-            name = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
-            found[name] = ast.parse(path.read_text(encoding="utf-8"), str(path))
-    return found
+    """Name → file of every module of the packages, with its syntax tree."""
+    return {source.module: source for source in product_files(*PACKAGES)}
 
 
-@cache  # a walk through all modules takes half a second
-def imported_names(tree):
+@cache
+def imported_names(source):
     """Dotted names that a module imports anywhere."""
+    return names_of_imports(source.of(ast.Import, ast.ImportFrom))
+
+
+def names_of_imports(nodes):
+    """Dotted names that some nodes of a syntax tree import."""
     names = set()
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -106,8 +107,8 @@ def imported_names(tree):
 def imports():
     """Module → modules of the packages that it imports."""
     graph = {}
-    for name, tree in modules().items():
-        targets = imported_names(tree)
+    for name, source in modules().items():
+        targets = imported_names(source)
         graph[name] = {
             t if t in modules() else t.rpartition(".")[0] for t in targets if within(t, *PACKAGES)
         } - {name}
@@ -297,21 +298,18 @@ LATE = {"pandas", "scipy.optimize", "scipy.signal", "scipy.stats", "xarray"}
 def test_only_libraries_that_come_late_are_imported_for_type_checkers_alone():
     """Any other such import hides an arrow that runs back up, or a module that a start should not wait for."""
     blocks = [
-        (name, node)
-        for name, tree in modules().items()
-        for node in ast.walk(tree)
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+        (name, names_of_imports(source.within(node)))
+        for name, source in modules().items()
+        for node in source.of(ast.If)
+        if "TYPE_CHECKING" in ast.unparse(node.test)
     ]
     assert {name for name, _ in blocks} == {
-        n for n, tree in modules().items() if "TYPE_CHECKING" in _code_of(tree)
+        name
+        for name, source in modules().items()
+        if any("TYPE_CHECKING" in node.id for node in source.of(ast.Name))
     }
-    hiding = [(name, imported_names(node) - LATE) for name, node in blocks]
+    hiding = [(name, names - LATE) for name, names in blocks]
     assert {name.removeprefix("orchestrator.") for name, names in hiding if names} == FOR_TYPES
-
-
-def _code_of(tree):
-    """Names that a module uses, as text; its docstrings left out."""
-    return " ".join(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
 
 
 POINTS = (
@@ -330,8 +328,8 @@ def test_every_kept_point_is_known_here():
     """Whoever computes points has the kind of their task in a module ``…point``, whose code names their files."""
     kinds = {
         name
-        for name, tree in modules().items()
-        for node in tree.body
+        for name, source in modules().items()
+        for node in source.tree.body
         if isinstance(node, ast.ClassDef)
         if {ast.unparse(base) for base in node.bases} & {"Task", "BenchTask"}
     }
@@ -390,8 +388,8 @@ def test_there_is_no_cycle():
 def test_a_library_is_used_in_one_place(library, users):
     found = {
         name
-        for name, tree in modules().items()
-        if any(within(n, library) for n in imported_names(tree))
+        for name, source in modules().items()
+        if any(within(n, library) for n in imported_names(source))
     }
     assert found == users
 
@@ -446,15 +444,17 @@ def test_a_command_is_written_on_the_face(command):
 
 
 def test_only_the_command_line_reads_options():
-    using = {name for name, tree in modules().items() if "argparse" in imported_names(tree)}
+    using = {name for name, source in modules().items() if "argparse" in imported_names(source)}
     assert using
     assert all(within(name, "orchestrator.face.cli") for name in using)
 
 
 def test_equations_are_written_in_models_only():
-    for name, tree in modules().items():
+    for name, source in modules().items():
         if within(name, "orchestrator"):
-            assert not any(within(n, "fmus.toolchain.symbols") for n in imported_names(tree)), name
+            assert not any(within(n, "fmus.toolchain.symbols") for n in imported_names(source)), (
+                name
+            )
 
 
 def test_the_slave_needs_nothing_but_python_and_pythonfmu():
@@ -471,9 +471,9 @@ def test_the_slave_needs_nothing_but_python_and_pythonfmu():
 
 
 def test_errors_are_raised_by_a_name_of_their_own():
-    for name, tree in modules().items():
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Raise) and node.exc is not None:
+    for name, source in modules().items():
+        for node in source.of(ast.Raise):
+            if node.exc is not None:
                 raised = node.exc.func if isinstance(node.exc, ast.Call) else node.exc
                 assert ast.unparse(raised) not in ("Exception", "BaseException"), (
                     f"{name}, line {node.lineno}"
@@ -482,10 +482,7 @@ def test_errors_are_raised_by_a_name_of_their_own():
 
 def test_no_error_is_caught_without_saying_which():
     handlers = [
-        (name, n)
-        for name, tree in modules().items()
-        for n in ast.walk(tree)
-        if isinstance(n, ast.ExceptHandler)
+        (name, node) for name, source in modules().items() for node in source.of(ast.ExceptHandler)
     ]
     assert len(handlers) > 10
     for name, node in handlers:
@@ -536,8 +533,8 @@ def test_what_only_looks_like_one(text):
 def test_a_class_name_has_one_meaning():
     """The Python face gives the inner case and acceptance a friendlier form under the same name."""
     homes = {}
-    for name, tree in modules().items():
-        for node in tree.body:
+    for name, source in modules().items():
+        for node in source.tree.body:
             if (
                 within(name, "orchestrator")
                 and isinstance(node, ast.ClassDef)

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.source_files import product_files, read_source
+
 ROOT = Path(__file__).parents[1]
 PLACES = ("orchestrator/face/api", "gfor_fmu")
 """The public face and the product's models."""
@@ -64,9 +66,7 @@ def found():
     for package in PLACES:
         for path in sorted((ROOT / package).rglob("*.py")):
             place = path.relative_to(ROOT).as_posix()
-            for name, function in public_functions(
-                ast.parse(path.read_text(encoding="utf-8"), place)
-            ):
+            for name, function in public_functions(read_source(path).tree):
                 if len(arguments(function)) >= MANY:
                     yield pytest.param(function, id=f"{place}:{name}")
 
@@ -81,13 +81,13 @@ def test_docstring_explains_every_argument(function):
     )
 
 
-def documented(node):
-    """Functions and classes inside of a module that have more to them than a docstring, with its text."""
-    for inner in ast.walk(node):
-        if (
-            isinstance(inner, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
-            and len(inner.body) > 1
-        ):
+DEFINITIONS = (ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+
+
+def documented(nodes):
+    """Functions and classes among some nodes that have more to them than a docstring, with its text."""
+    for inner in nodes:
+        if isinstance(inner, DEFINITIONS) and len(inner.body) > 1:
             text = ast.get_docstring(inner)
             if text and not (
                 isinstance(inner.body[1], ast.Expr)
@@ -113,17 +113,16 @@ def says_nothing(node, text):
 
 
 def inside():
-    for package in INSIDE:
-        for path in sorted((ROOT / package).rglob("*.py")):
-            if not path.is_relative_to(ROOT / "orchestrator/face/api"):
-                yield path.relative_to(ROOT).as_posix(), ast.parse(path.read_text(encoding="utf-8"))
+    for source in product_files(*INSIDE):
+        if not source.path.is_relative_to(ROOT / "orchestrator/face/api"):
+            yield source
 
 
 def test_inside_a_docstring_says_what_the_name_does_not():
     empty = [
-        f"{place}:{node.lineno} {node.name}: {text!r}"
-        for place, module in inside()
-        for node, text in documented(module)
+        f"{source.place}:{node.lineno} {node.name}: {text!r}"
+        for source in inside()
+        for node, text in documented(source.of(*DEFINITIONS))
         if says_nothing(node, cleandoc(text))
     ]
     assert not empty, "say what the name does not, or nothing:\n" + "\n".join(empty)
@@ -141,4 +140,5 @@ def test_inside_a_docstring_says_what_the_name_does_not():
     ],
 )
 def test_an_empty_docstring_is_told_from_one_that_says_something(source, empty):
-    assert any(says_nothing(node, text) for node, text in documented(ast.parse(source))) == empty
+    nodes = ast.walk(ast.parse(source))
+    assert any(says_nothing(node, text) for node, text in documented(nodes)) == empty

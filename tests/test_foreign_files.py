@@ -25,6 +25,7 @@ from orchestrator.output.results.csv_recording import read_table
 from orchestrator.simulation.interop.probe_result import read_probe_result
 from orchestrator.studies.immittance.scan_files import read_scan
 from orchestrator.systems.ssp.archive import SspArchive
+from tests.support.source_files import product_files
 
 ROOT = Path(__file__).parents[1]
 unix = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no named pipes among files")
@@ -177,23 +178,21 @@ OWN = {
 """Modules that read files by themselves, and why no pipe or device can be there."""
 
 
-def reads_by_itself(tree):
+def reads_by_itself(source):
     """Calls that read a file which does not lie beside the code; a mailbox is memory."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+    for node in source.of(ast.Call):
+        if getattr(node.func, "attr", "") in ("read_text", "read_bytes"):
             whose = ast.unparse(node.func.value)
-            ours = "__file__" in whose or whose.endswith("box")
-            if node.func.attr in ("read_text", "read_bytes") and not ours:
+            if not ("__file__" in whose or whose.endswith("box")):
                 yield node.lineno
 
 
 def test_whoever_reads_a_named_file_asks_here():
     """A reader that opens what a user names by itself hangs at a pipe."""
     found = {}
-    for path in sorted((ROOT / "orchestrator").rglob("*.py")):
-        name = ".".join(path.relative_to(ROOT / "orchestrator").with_suffix("").parts)
-        if lines := list(reads_by_itself(ast.parse(path.read_text(encoding="utf-8")))):
-            found[name.removesuffix(".__init__")] = lines
+    for source in product_files("orchestrator"):
+        if lines := list(reads_by_itself(source)):
+            found[source.module.removeprefix("orchestrator.")] = lines
     new = {name: lines for name, lines in found.items() if name not in OWN}
     assert not new, "use orchestrator.core.foreign_files, or say in OWN why it need not"
     assert not set(OWN) - set(found), "these read nothing any more"
@@ -308,34 +307,27 @@ FROM_OUR_OWN_PROCESS = {"orchestrator/simulation/federation/federate.py"}
 """Modules that unpickle what another process of the same run wrote."""
 
 
-def _called(tree):
+def _called(source):
     """Names that a module calls, and the keyword arguments that it gives there."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Call):
-            function = node.func
-            name = (
-                function.attr
-                if isinstance(function, ast.Attribute)
-                else getattr(function, "id", "")
-            )
-            owner = getattr(getattr(function, "value", None), "id", "")
-            yield owner, name, {word.arg: word.value for word in node.keywords}
+    for node in source.of(ast.Call):
+        function = node.func
+        name = getattr(function, "attr", getattr(function, "id", ""))
+        owner = getattr(getattr(function, "value", None), "id", "")
+        yield owner, name, {word.arg: word.value for word in node.keywords}
 
 
 def test_no_reader_is_called_that_runs_code_out_of_a_file():
     found = []
-    for package in ("orchestrator", "fmus", "gfor_fmu"):
-        for path in sorted((ROOT / package).rglob("*.py")):
-            place = path.relative_to(ROOT).as_posix()
-            for owner, name, words in _called(ast.parse(path.read_text(encoding="utf-8"))):
-                allowed = words.get("allow_pickle")
-                pickles = allowed is not None and getattr(allowed, "value", True) is not False
-                unpickles = owner in {"pickle", "dill", "joblib", "skrf", "rf"} and name in {
-                    "load",
-                    "loads",
-                    "read",
-                }
-                if (name in RUNS_CODE and owner in {"pd", "pickle"}) or pickles or unpickles:
-                    found.append((place, f"{owner}.{name}".lstrip(".")))
+    for source in product_files():
+        for owner, name, words in _called(source):
+            allowed = words.get("allow_pickle")
+            pickles = allowed is not None and getattr(allowed, "value", True) is not False
+            unpickles = owner in {"pickle", "dill", "joblib", "skrf", "rf"} and name in {
+                "load",
+                "loads",
+                "read",
+            }
+            if (name in RUNS_CODE and owner in {"pd", "pickle"}) or pickles or unpickles:
+                found.append((source.place, f"{owner}.{name}".lstrip(".")))
     assert [one for one in found if one[0] not in FROM_OUR_OWN_PROCESS] == []
     assert {place for place, _ in found} == FROM_OUR_OWN_PROCESS

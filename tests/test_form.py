@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.form import ROOT, RULES, SourceFile, product_files
+from tests.support.form import RULES
+from tests.support.source_files import ROOT, SourceFile, product_files
 
 LIMITS = tomllib.loads((Path(__file__).parent / "form.toml").read_text(encoding="utf-8"))
 

@@ -11,7 +11,8 @@ import subprocess
 from collections import Counter
 from pathlib import PurePosixPath
 
-from tests.support.form import PRODUCT, ROOT, RULES, SourceFile, product_files
+from tests.support.form import RULES
+from tests.support.source_files import PRODUCT, ROOT, SourceFile, product_files
 
 
 def files_of_revision(revision: str) -> list[SourceFile]:
@@ -42,7 +43,7 @@ def places(rule: str, files: list[SourceFile]) -> list[str]:
     return [
         f"{source.path.relative_to(ROOT)}:{line}"
         for source in files
-        for line in RULES[rule](source)
+        for line in sorted(RULES[rule](source))
     ]
 
 

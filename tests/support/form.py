@@ -7,14 +7,11 @@ import ast
 import io
 import re
 import tokenize
+from bisect import bisect_left, bisect_right
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import cached_property
-from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
-PRODUCT = ("fmus", "gfor_fmu", "orchestrator")
+from tests.support.source_files import SourceFile
 
 MOST_IN_A_STATEMENT = 2
 """Comprehensions, conditional expressions and lambdas that a statement may hold."""
@@ -32,36 +29,6 @@ _NESTED = (ast.GeneratorExp, ast.ListComp, ast.SetComp, ast.DictComp, ast.IfExp,
 _COMPREHENSIONS = (ast.GeneratorExp, ast.ListComp, ast.SetComp, ast.DictComp)
 
 
-@dataclass(frozen=True)
-class SourceFile:
-    """One file of Python with its syntax tree."""
-
-    path: Path
-    text: str
-    tree: ast.Module
-
-    @classmethod
-    def read(cls, path: Path) -> "SourceFile":
-        text = path.read_text(encoding="utf-8")
-        return cls(path, text, ast.parse(text))
-
-    @property
-    def room(self) -> str:
-        """The package and its folder, such as ``orchestrator/studies/sweep``."""
-        parts = self.path.relative_to(ROOT).parts
-        return "/".join(parts[: min(2, len(parts) - 1)])
-
-    @cached_property
-    def walked(self) -> list[ast.AST]:
-        """All nodes of the tree, in the order of `ast.walk`, which takes longer than the rules."""
-        return list(ast.walk(self.tree))
-
-    @property
-    def nodes(self) -> int:
-        """Expressions and statements, which no layout changes."""
-        return sum(isinstance(node, ast.expr | ast.stmt) for node in self.walked)
-
-
 Finder = Callable[[SourceFile], Iterator[int]]
 
 
@@ -76,22 +43,24 @@ def marks_for_the_formatter(source: SourceFile) -> Iterator[int]:
 
 def nested_conditionals(source: SourceFile) -> Iterator[int]:
     """Conditional expressions that hold another."""
-    for node in source.walked:
-        if isinstance(node, ast.IfExp):
-            parts = [*ast.iter_child_nodes(node)]
-            if any(isinstance(inner, ast.IfExp) for part in parts for inner in ast.walk(part)):
-                yield node.lineno
+    for node in source.of(ast.IfExp):
+        if sum(isinstance(inner, ast.IfExp) for inner in source.within(node)) > 1:
+            yield node.lineno
 
 
 def crowded_statements(source: SourceFile) -> Iterator[int]:
     """Statements with more comprehensions, conditionals and lambdas than one reads at once."""
-    for node in source.walked:
-        if isinstance(node, ast.stmt):
-            expressions = [*_own_expressions(node)]
-            cells = {id(value) for inner in expressions for value in _cells_of_a_column(inner)}
-            held = sum(isinstance(x, _NESTED) and id(x) not in cells for x in expressions)
-            if held > MOST_IN_A_STATEMENT:
-                yield node.lineno
+    lines = sorted(node.lineno for node in source.of(*_NESTED))
+    for node in source.of(ast.stmt):
+        decorators = getattr(node, "decorator_list", ())
+        first = min([node.lineno, *(one.lineno for one in decorators)])
+        if bisect_right(lines, node.end_lineno) - bisect_left(lines, first) <= MOST_IN_A_STATEMENT:
+            continue
+        expressions = [*_own_expressions(node)]
+        cells = {id(value) for inner in expressions for value in _cells_of_a_column(inner)}
+        held = sum(isinstance(x, _NESTED) and id(x) not in cells for x in expressions)
+        if held > MOST_IN_A_STATEMENT:
+            yield node.lineno
 
 
 def _cells_of_a_column(node: ast.AST) -> list[ast.expr]:
@@ -114,17 +83,16 @@ def _own_expressions(statement: ast.stmt) -> Iterator[ast.AST]:
 
 def long_calls(source: SourceFile) -> Iterator[int]:
     """Calls with more arguments by place than one can tell apart."""
-    for node in source.walked:
-        if not isinstance(node, ast.Call) or len(node.args) <= MOST_POSITIONAL:
-            continue
-        if not any(isinstance(argument, ast.Starred) for argument in node.args):
+    for node in source.of(ast.Call):
+        many = len(node.args) > MOST_POSITIONAL
+        if many and not any(isinstance(argument, ast.Starred) for argument in node.args):
             yield node.lineno
 
 
 def packs_of_constants(source: SourceFile) -> Iterator[int]:
     """Assignments of several constants at once, which have no place for a reason each."""
-    for node in source.walked:
-        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Tuple):
+    for node in source.of(ast.Assign):
+        if isinstance(node.targets[0], ast.Tuple):
             values = node.value.elts if isinstance(node.value, ast.Tuple) else []
             if len(values) > 1 and all(isinstance(value, ast.Constant) for value in values):
                 yield node.lineno
@@ -132,34 +100,30 @@ def packs_of_constants(source: SourceFile) -> Iterator[int]:
 
 def walruses_outside_conditions(source: SourceFile) -> Iterator[int]:
     """Assignments inside expressions, but for the conditions of if, while and comprehensions."""
-    conditions: list[ast.expr] = []
-    for node in source.walked:
-        if isinstance(node, ast.If | ast.While):
-            conditions.append(node.test)
-        elif isinstance(node, ast.comprehension):
-            conditions.extend(node.ifs)
+    conditions = [node.test for node in source.of(ast.If, ast.While)]
+    for node in source.of(ast.comprehension):
+        conditions.extend(node.ifs)
     allowed = {
         id(inner)
         for condition in conditions
-        for inner in ast.walk(condition)
+        for inner in source.within(condition)
         if isinstance(inner, ast.NamedExpr)
     }
-    for node in source.walked:
-        if isinstance(node, ast.NamedExpr) and id(node) not in allowed:
+    for node in source.of(ast.NamedExpr):
+        if id(node) not in allowed:
             yield node.lineno
 
 
 def walruses(source: SourceFile) -> Iterator[int]:
     """Assignments inside expressions, wherever they stand."""
-    for node in source.walked:
-        if isinstance(node, ast.NamedExpr):
-            yield node.lineno
+    for node in source.of(ast.NamedExpr):
+        yield node.lineno
 
 
 def crowded_constructors(source: SourceFile) -> Iterator[int]:
     """Calls of a class with a comprehension in most of their arguments."""
-    for node in source.walked:
-        if isinstance(node, ast.Call) and _names_a_class(node.func):
+    for node in source.of(ast.Call):
+        if _names_a_class(node.func):
             values = [*node.args, *(keyword.value for keyword in node.keywords)]
             crowded = sum(isinstance(value, _COMPREHENSIONS) for value in values)
             if len(values) >= MANY_FIELDS and 2 * crowded > len(values):
@@ -173,11 +137,9 @@ def _names_a_class(function: ast.expr) -> bool:
 
 def fragments_as_docstrings(source: SourceFile) -> Iterator[int]:
     """Docstrings that begin as half a sentence."""
-    for node in source.walked:
-        if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module | ast.AsyncFunctionDef):
-            text = ast.get_docstring(node) or ""
-            if re.match(r"(What|Whether|Of|As)\b", text):
-                yield getattr(node, "lineno", 1)
+    for node in source.of(ast.FunctionDef, ast.ClassDef, ast.Module, ast.AsyncFunctionDef):
+        if re.match(r"(What|Whether|Of|As)\b", ast.get_docstring(node) or ""):
+            yield getattr(node, "lineno", 1)
 
 
 PARTICIPLES = re.compile(
@@ -189,20 +151,19 @@ PARTICIPLES = re.compile(
 
 def participles_as_functions(source: SourceFile) -> Iterator[int]:
     """Functions whose name is a bare participle."""
-    for node in source.walked:
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and PARTICIPLES.match(
-            node.name
-        ):
+    for node in source.of(ast.FunctionDef, ast.AsyncFunctionDef):
+        if PARTICIPLES.match(node.name):
             yield node.lineno
 
 
 def long_functions(source: SourceFile) -> Iterator[int]:
     """Functions that grew beyond what one reads as one idea; no layout changes their size."""
-    for node in source.walked:
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-            held = sum(isinstance(inner, ast.expr | ast.stmt) for inner in ast.walk(node))
-            if held > MOST_IN_A_FUNCTION:
-                yield node.lineno
+    for node in source.of(ast.FunctionDef, ast.AsyncFunctionDef):
+        inside = source.within(node)
+        if len(inside) <= MOST_IN_A_FUNCTION:
+            continue
+        if sum(isinstance(inner, ast.expr | ast.stmt) for inner in inside) > MOST_IN_A_FUNCTION:
+            yield node.lineno
 
 
 RULES: dict[str, Finder] = {
@@ -218,15 +179,6 @@ RULES: dict[str, Finder] = {
     "functions named by a bare participle": participles_as_functions,
     "functions that grew too long": long_functions,
 }
-
-
-def product_files() -> list[SourceFile]:
-    """The files of the three packages, in the order of their paths."""
-    return [
-        SourceFile.read(path)
-        for package in PRODUCT
-        for path in sorted((ROOT / package).rglob("*.py"))
-    ]
 
 
 def count_places(files: list[SourceFile]) -> dict[str, Counter[str]]:
