@@ -1,4 +1,4 @@
-"""States that are coupled with nothing: clocks, which say nothing of a system, and what should not be taken for one."""
+"""States that nothing moves: clocks, which say nothing of a system, and what should not be taken for one."""
 
 from orchestrator.core.errors import few
 from orchestrator.linear.models.linear_model import LinearModel
@@ -8,17 +8,20 @@ _SHOWN = 3
 
 
 def standing_apart(master: Master, model: LinearModel, zeros: int) -> list[str]:
-    """A sentence on states that nothing moves and that move nothing, where their zeros would not pass for the free
-    angle.
+    """A sentence on states that nothing moves, where their zeros would not pass for the free angle.
 
-    Their zeros are not counted among those that nothing restores. An integrator of a controller that is off looks just
-    like that, so that whoever believes it on must be told. A state in seconds is a clock."""
-    if zeros + len(model.apart) <= 1:
+    Their zeros are not counted among those that nothing restores: what nothing moves does not drift. An integrator of a
+    controller that is off looks just like that, so that whoever believes it on must be told. A state in seconds is a
+    clock."""
+    if zeros + len(model.unmoved) <= 1:
         return []
-    names = [name for name in model.apart if _unit(master, name) != "s"]
+    names = [name for name in model.unmoved if _unit(master, name) != "s"]
     if not names:
         return []
-    text = f"states that nothing moves and that move nothing, as of a controller that is off: {few(names, _SHOWN)}"
+    text = (
+        f"states that nothing moves, as of a controller that is off or rests within a dead band: "
+        f"{few(names, _SHOWN)}"
+    )
     return [f"{text}; their zeros are not counted"]
 
 

@@ -98,30 +98,25 @@ class LinearModel:
         result: Vector = self.F @ z + self.G @ settled
         return result
 
-    @property
-    def clocks(self) -> int:
-        """Number of states that stand `apart`: each is a zero of its own that says nothing of the system."""
-        return len(self.apart)
+    @cached_property
+    def unmoved(self) -> tuple[str, ...]:
+        """Names of the states that nothing moves, whatever they move themselves: clocks, and the integrators of
+        controllers that are off or rest within a dead band. Each is a zero of its own, and none drifts."""
+        return tuple(self.names[k] for k in np.flatnonzero(self._is_unmoved))
 
     @cached_property
-    def apart(self) -> tuple[str, ...]:
-        """Names of the states that stand or advance by themselves, and are coupled with no other: clocks, and the
-        integrators of controllers that are off."""
-        return tuple(self.names[k] for k in np.flatnonzero(self._is_apart))
-
-    @cached_property
-    def _is_apart(self) -> NDArray[np.bool_]:
+    def _is_unmoved(self) -> NDArray[np.bool_]:
         own = self.F.diagonal()
         others = sp.csr_array(self.F - sp.diags_array(own))
-        alone: NDArray[np.bool_] = own == (0.0 if self.step_size is None else 1.0)
-        for matrix, axis in ((others, 0), (others, 1), (self.G, 1), (self.H, 0)):
-            alone &= np.asarray(abs(matrix).sum(axis=axis)).ravel() == 0
-        return alone
+        stands: NDArray[np.bool_] = own == (0.0 if self.step_size is None else 1.0)
+        for matrix in (others, self.G):
+            stands &= np.asarray(abs(matrix).sum(axis=1)).ravel() == 0
+        return stands
 
     @property
     def coupled(self) -> Self:
-        """The model without the states that stand `apart`: the others' eigenvalues are the same."""
-        kept = np.flatnonzero(~self._is_apart)
+        """The model without its `unmoved` states: the others' eigenvalues are the same."""
+        kept = np.flatnonzero(~self._is_unmoved)
         if len(kept) == len(self.names):
             return self
         F = self.F[kept][:, kept]

@@ -42,6 +42,16 @@ class Decay:
     rate: float
 
 
+def decay_of(system: LinearModel, of_map: NDArray[np.complex128]) -> Decay | None:
+    """The decay of a large system; None where it is not proved, or where all eigenvalues take no time.
+
+    ``of_map``: all eigenvalues of its step map, or of a system that is much like it [rad/s]."""
+    if len(system.names) < LEAST_STATES:
+        return None
+    network = reduced(system)
+    return None if network is None else slowest_decay(system, network, of_map)
+
+
 def slowest_decay(
     system: LinearModel, network: ReducedNetwork, of_map: NDArray[np.complex128]
 ) -> Decay | None:

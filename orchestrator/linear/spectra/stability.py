@@ -128,7 +128,7 @@ class Stability(NoTruth):
     growing
         Number of growing modes; a conjugate pair counts once.
     zeros
-        Eigenvalues taken for zero, such as that of the free angle.
+        Eigenvalues taken for zero, such as that of the free angle; not those of states that nothing moves.
     eigenvalues
         Number of all eigenvalues.
     cause
@@ -152,8 +152,8 @@ class Stability(NoTruth):
     # the mode of the largest real part: of the step map, or of the continuous system if only this one grows
     mode: Mode | None = None
     growing: int = 0  # number of growing modes of the same model; a conjugate pair counts once
-    # eigenvalues taken for zero (`orchestrator.linear.spectra.modes.ZERO`), clocks left out: the free
-    # angle
+    # eigenvalues taken for zero (`orchestrator.linear.spectra.modes.ZERO`), those of states that nothing
+    # moves left out: the free angle
     zeros: int = 0
     eigenvalues: int = 0
     cause: Cause | None = None  # the cause of growth; None if no mode grows
@@ -246,7 +246,11 @@ def whole_spectrum(model: LinearModel) -> Spectrum | None:
         return None
     if len(model.names) <= _DENSE_VECTORS:
         return find_spectrum(model, np.inf, np.inf)
-    values = eigenvalues(model)
+    return spectrum_of(model, eigenvalues(model))
+
+
+def spectrum_of(model: LinearModel, values: NDArray[np.complex128]) -> Spectrum:
+    """The spectrum of a large model whose eigenvalues [rad/s] are all known, with the rightmost mode alone."""
     k = index_of_rightmost(values)
     if k is None:
         return Spectrum(values, [], None)
@@ -357,7 +361,7 @@ def _look_at(model: LinearModel, spectrum: Spectrum | None) -> Stability:
             reason=f"too large for all {n} eigenvalues: the right half-plane was searched, {search.not_searched}",
         )
     growing = int(grows(spectrum.eigenvalues).sum())
-    zeros = int((np.abs(spectrum.eigenvalues) <= ZERO).sum()) - model.clocks
+    zeros = int((np.abs(spectrum.eigenvalues) <= ZERO).sum()) - len(model.unmoved)
     cause = Cause.SYSTEM if growing and model.step_size is None else None
     return Stability(
         growing == 0,

@@ -113,7 +113,7 @@ class PointModes:
     who: tuple[str, ...] = ()  # for each of ``swinging``: who takes part most
     rightmost: str = ""  # the same for the eigenvalue with the largest real part
     loops: OpenLoops | None = None  # the open loops; None where they were not asked for
-    # number of states that are coupled with no other, each of which is a zero in ``values``
+    # number of states that nothing moves, each of which is a zero in ``values``
     clocks: int = 0
     lasting: bool = True  # whether computing it again would give the same
 
@@ -233,7 +233,7 @@ def _modes(
         who=tuple(map(_who, modes)),
         rightmost=rightmost,
         loops=loops,
-        clocks=model.clocks,
+        clocks=len(model.unmoved),
     )
 
 

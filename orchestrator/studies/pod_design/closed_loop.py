@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
@@ -19,7 +20,9 @@ from orchestrator.linear.models.component_linearization import ComponentLineariz
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.linearization import Blocks, compose, continuous, where_given
 from orchestrator.linear.spectra.continuation import Eigenpair, follow_along
-from orchestrator.linear.spectra.modes import damping_ratio
+from orchestrator.linear.spectra.modes import Mode, damping_ratio
+from orchestrator.linear.spectra.slowest_decay import decay_of
+from orchestrator.linear.spectra.stability import spectrum_of
 from orchestrator.studies.pod_design.lead_lag import NO_COMPENSATION, LeadLag
 from orchestrator.studies.pod_design.stages import GAIN_ALONE, NEEDED
 from orchestrator.studies.points.key import key_of
@@ -142,11 +145,32 @@ class PodLoop:
     def block(self, name: str) -> ComponentLinearization:
         return self._blocks.components[name]
 
-    def examine(self, setting: PodSetting) -> Examination:
-        """The verdict on the whole system with this setting, at any frequency, with its warnings."""
+    def examine(
+        self,
+        setting: PodSetting,
+        values: NDArray[np.complex128] | None = None,
+        modes: Sequence[Mode] | None = None,
+    ) -> Examination:
+        """The verdict on the whole system with this setting, at any frequency, with its warnings.
+
+        ``values``: all eigenvalues of a large system's step map with this setting [rad/s], where they are known; that
+        the continuous system decays is then proved without all of its own.
+        ``modes``: the modes that must not depend on the perturbation, where they are known."""
         system = where_given(lambda: self._continuous_model(setting))
         model = self._model(setting)
-        return examine(self._master, self._blocks, model, system)
+        spectrum, decay = None, None
+        if values is not None:
+            spectrum = spectrum_of(model, values)
+            decay = None if system is None else decay_of(system, values)
+        return examine(
+            self._master,
+            self._blocks,
+            model,
+            system,
+            spectrum=spectrum,
+            of_system=decay,
+            modes=modes,
+        )
 
     def _model(self, setting: PodSetting) -> LinearModel:
         """The step map with this setting, composed of the blocks; linearised once where it is asked for in a row."""

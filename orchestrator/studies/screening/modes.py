@@ -191,7 +191,7 @@ def _among(values: Vector, model: LinearModel, modes: ModeSet, *, searched: bool
     ]
     others = growing[~np.array(known, dtype=bool)]
     fastest = complex(others[np.argmax(others.real)]) if len(others) else None
-    zeros = int((np.abs(values) <= ZERO).sum()) - model.clocks
+    zeros = int((np.abs(values) <= ZERO).sum()) - len(model.unmoved)
     return FoundModes(modes, searched, int((1 + (others.imag > 0)).sum()), fastest, zeros)
 
 

@@ -184,7 +184,6 @@ def _with_pod(
     coupled = loop.place(start, trial.gain, trial.filters).eigenvalue - start.eigenvalue
     reached = loop.place(start, tuned.gain, tuned.filters)
     least = least_of(looks.all_values(tuned), frequency_range, reached.eigenvalue)
-    stable = loop.examine(tuned).stability.stable
     return Confirmation(
         bus,
         predicted,
@@ -193,7 +192,7 @@ def _with_pod(
         setting=tuned,
         tuned=reached.eigenvalue,
         least=least,
-        stable=stable,
+        stable=looks.is_stable(tuned),
         search=search,
     )
 

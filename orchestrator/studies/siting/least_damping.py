@@ -19,7 +19,14 @@ from orchestrator.linear.spectra.followed_swings import (
     weakest_swing,
 )
 from orchestrator.linear.spectra.mode_refinement import RefinedModes
-from orchestrator.linear.spectra.modes import Mode, damping_ratio, eigenvalues
+from orchestrator.linear.spectra.modes import (
+    ELECTROMECHANICAL_HZ,
+    Mode,
+    damping_ratio,
+    eigenvalues,
+    least_damped_first,
+    make_mode,
+)
 from orchestrator.linear.spectra.stability import fastest_growth
 from orchestrator.studies.pod_design.closed_loop import PodLoop, PodSetting
 from orchestrator.studies.pod_design.guard import weakest_and_growing
@@ -73,6 +80,14 @@ class LeastDamping:
                 self._whole[setting] = eigenvalues(self._loop.model(setting))
         return self._whole[setting]
 
+    def is_stable(self, setting: PodSetting) -> bool | None:
+        """The verdict on the whole system, at any frequency; None where it is not known."""
+        swings = self._swings.get(setting)
+        if swings is None:
+            return self._loop.examine(setting).stability.stable
+        modes = _in_range(swings, self._loop.model(setting).names)
+        return self._loop.examine(setting, self.all_values(setting), modes).stability.stable
+
     def _followed(self, setting: PodSetting) -> RefinedModes | None:
         """The swings from those of the nearest smaller gain with the same lead/lag; None where only all eigenvalues
         show them, which take less than a search."""
@@ -96,6 +111,16 @@ class LeastDamping:
         ]
         nearest = max(alike, key=lambda one: one.gain, default=PodSetting(0.0, NO_COMPENSATION))
         return self._followed(nearest)
+
+
+def _in_range(swings: RefinedModes, names: tuple[str, ...]) -> list[Mode]:
+    """The swings from 0.1 to 2 Hz, least damped first."""
+    every = (
+        make_mode(value, swings.left[:, k], swings.right[:, k], names)
+        for k, value in enumerate(swings.values.tolist())
+    )
+    low, high = ELECTROMECHANICAL_HZ
+    return least_damped_first(mode for mode in every if low <= mode.frequency_hz <= high)
 
 
 def _searched(model: LinearModel) -> RefinedModes | None:

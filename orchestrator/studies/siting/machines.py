@@ -267,7 +267,7 @@ def _confirmed(result: MachineSites, machine: str, scenario: str) -> Confirmatio
                 setting=tuned,
                 tuned=reached.eigenvalue,
                 least=least_of(values, request.frequencies, reached.eigenvalue),
-                stable=loop.examine(tuned).stability.stable,
+                stable=looks.is_stable(tuned),
                 search=search,
             )
     except CosimError as error:

@@ -1,4 +1,4 @@
-"""States that are coupled with nothing: a clock is not told, a controller that is off is, wherever modes are judged."""
+"""States that nothing moves: a clock is not told, a controller that is off is, wherever modes are judged."""
 
 from types import SimpleNamespace
 
@@ -21,16 +21,24 @@ from orchestrator.studies.operating_points.item import Status
 from orchestrator.studies.points.executor import Serial
 from orchestrator.studies.points.points import Work
 from orchestrator.studies.points.store import PointStore
+from orchestrator.studies.screening import point as screening_point
 from orchestrator.studies.screening.request import ScreeningRequest
 from orchestrator.studies.screening.study import plan_screening, run_screening
 
-SAID = "states that nothing moves and that move nothing, as of a controller that is off: grid.clock.t; their zeros"
+SAID = (
+    "states that nothing moves, as of a controller that is off or rests within a dead band: "
+    "grid.clock.t; their zeros"
+)
 
 
 @pytest.fixture
 def without_units(monkeypatch):
     """The clock of the infinite bus counts no seconds: it could be any integrator that is off."""
     monkeypatch.setattr(apart, "_unit", lambda master, name: "")
+
+
+def with_its_zero(master, model, zeros):
+    return apart.standing_apart(master, model, zeros + 1)
 
 
 def modes():
@@ -40,7 +48,7 @@ def modes():
 def test_a_clock_is_not_told():
     found = modes()
     assert not any("nothing moves" in text for text in found.warnings)
-    assert "grid.clock.t" in found.model.apart
+    assert "grid.clock.t" in found.model.unmoved
 
 
 def test_an_integrator_that_is_off_is_told_beside_the_verdict(without_units):
@@ -48,8 +56,9 @@ def test_an_integrator_that_is_off_is_told_beside_the_verdict(without_units):
 
 
 def test_screenings_and_designs_tell_it_at_their_points(monkeypatch, tmp_path):
-    monkeypatch.setattr(LinearModel, "apart", property(lambda self: ("gfor.off.x",)))
-    monkeypatch.setattr(LinearModel, "clocks", 0)  # its zero is not there
+    monkeypatch.setattr(LinearModel, "unmoved", property(lambda self: ("gfor.off.x",)))
+    for place in (point, screening_point):  # its zero is not there
+        monkeypatch.setattr(place, "standing_apart", with_its_zero)
     case, store = load_case("two_area"), PointStore(tmp_path / "points")
     (tmp_path / "points.csv").write_text("name\nonly\n")
     (item,) = run_screening(

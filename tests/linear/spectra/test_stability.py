@@ -116,27 +116,30 @@ def test_a_free_angle_is_no_growth(size_of_it, zeros):
     assert verdict.stable is bool(zeros)
 
 
+BETWEEN = np.array([[1.0, -1.0], [-1.0, 1.0]])
+TWO_MACHINES = np.block([[np.zeros((2, 2)), np.eye(2)], [-9.0 * BETWEEN, -BETWEEN]])
+"""Angles and speeds of two machines that hold each other, while nothing holds both."""
+
+
 @pytest.mark.parametrize("step_size", [None, STEP])
 def test_a_clock_is_no_second_zero_but_a_frequency_that_nothing_holds_is(step_size):
     clock_and_angle = scipy.linalg.block_diag([[0.0]], [[0.0, 0.3], [0.0, -1.0]])
-    angle_and_frequency = scipy.linalg.block_diag([[0.0, 1.0], [0.0, 0.0]], [[-1.0]])
     assert judge(model(clock_and_angle, step_size)).zeros == 1
-    assert judge(model(angle_and_frequency, step_size)).zeros == 2
-    assert "nothing restores" in judge(model(angle_and_frequency, step_size)).sentence()
+    assert judge(model(TWO_MACHINES, step_size)).zeros == 2
+    assert "nothing restores" in judge(model(TWO_MACHINES, step_size)).sentence()
 
 
 @pytest.mark.parametrize("step_size", [None, STEP])
-def test_what_stands_apart_is_named_and_can_be_left_out(step_size):
-    """An integrator that is driven, or that drives, is neither a clock nor a controller that is off."""
+def test_what_nothing_moves_is_named_and_can_be_left_out(step_size):
+    """An integrator that is driven drifts; a controller that is off does not, whether or not others read it."""
     A = scipy.linalg.block_diag(
         [[0.0]], [[0.0, 0.3], [0.0, -1.0]], [[0.0]], [[0.0, 0.0], [0.2, -2.0]]
     )
     found = model(A, step_size)
-    assert found.apart == tuple(found.names[k] for k in (0, 3))
-    assert found.clocks == 2
-    assert found.coupled.names == tuple(found.names[k] for k in (1, 2, 4, 5))
-    np.testing.assert_array_equal(found.coupled.A, found.A[np.ix_([1, 2, 4, 5], [1, 2, 4, 5])])
-    assert judge(found).zeros == judge(found.coupled).zeros == 2
+    assert found.unmoved == tuple(found.names[k] for k in (0, 3, 4))
+    assert found.coupled.names == tuple(found.names[k] for k in (1, 2, 5))
+    np.testing.assert_array_equal(found.coupled.A, found.A[np.ix_([1, 2, 5], [1, 2, 5])])
+    assert judge(found).zeros == judge(found.coupled).zeros == 1
 
 
 def test_the_system_or_the_coupling_is_named():
@@ -192,16 +195,13 @@ def test_the_range_does_not_touch_the_verdict():
 
 def test_a_double_zero_that_the_perturbation_splits_is_no_growth():
     """Without governors nothing restores the frequency; the step map's own pair is an error divided by the step."""
-    split, exact = (
-        np.diag([2.6e-3, -2.6e-3, -1.0]),
-        np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
-    )
+    split, exact = np.diag([2.6e-3, -2.6e-3, -1.0, -1.0]), TWO_MACHINES
     verdict = judge(model(split, STEP), system=model(exact))
     assert verdict.stable is True
     assert verdict.zeros == 2
     assert "2 eigenvalues are zero" in verdict.sentence()
     assert judge(model(split, STEP)).stable is False  # nothing says that it is an error
-    assert judge(model(np.diag([0.06, -1.0, -1.0]), STEP), system=model(exact)).stable is False
+    assert judge(model(np.diag([0.06, -1.0, -1.0, -1.0]), STEP), system=model(exact)).stable is False
 
 
 def test_electromechanical_modes_outside_of_the_range_are_named_with_a_range_that_shows_them():
