@@ -20,7 +20,7 @@ _BEYOND = 1.3
 """Modes are followed a little beyond the range and the damping that are asked for, so that those which enter are known
 already."""
 
-_MOST_STATES = 4000
+MOST_COUNTED = 4000
 """Up to this number of states, all eigenvalues are computed where growth is counted (4 s of processor time with 3,000
 states), and where a search for some of them does not converge."""
 
@@ -102,12 +102,12 @@ def find_modes_here(
         try:
             found = _from_search(model, equations, wanted)
         except AnalysisError:
-            if len(model.names) > _MOST_STATES:
+            if len(model.names) > MOST_COUNTED:
                 raise
             return _whole(model, wanted)
     if not count:
         return FoundModes(found, searched, None)
-    if len(model.names) <= _MOST_STATES:
+    if len(model.names) <= MOST_COUNTED:
         return _counted_among_all(model, found, searched=searched)
     zeros, slow = _near_zero(model, found)
     return FoundModes(

@@ -32,6 +32,7 @@ from orchestrator.studies.points.failure import Failure
 from orchestrator.studies.points.parts_done import tell_part
 from orchestrator.studies.points.task import Task, computed
 from orchestrator.studies.screening.modes import (
+    MOST_COUNTED,
     CriticalRegion,
     FoundModes,
     find_modes_here,
@@ -50,6 +51,8 @@ class StretchTask(Task):
     items: tuple[Item, ...]  # what is computed, in this order
     # whether growing eigenvalues are counted at all items, rather than at the ends
     whole: bool = False
+    # the same, where this takes little beside the rest of an item
+    few: bool = False
     sharing: SharingRule | None = None  # how units share an outage; as the case says where None
     # whether taps and switched shunts move after an outage, whatever the case says
     move_controls: bool = False
@@ -68,6 +71,7 @@ class StretchTask(Task):
                 said,
                 self.wanted,
                 self.whole,
+                self.few,
                 self.sharing,
                 self.move_controls,
                 self.runs,
@@ -289,6 +293,7 @@ class _Worker:
         linear = self._bench.linear_model()
         model, whole = linear.model, linear.components
         warnings = (*warnings, *linear.doubts)
+        count = count or (self._task.few and len(model.names) <= MOST_COUNTED)
         own = self._own_eigenvalues(whole) if count else np.zeros(0, dtype=complex)
         found = find_modes_here(
             model, own, wanted, None if neighbour is None else neighbour.modes, count=count

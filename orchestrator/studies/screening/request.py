@@ -124,8 +124,8 @@ class ScreeningRequest(OverCluster):
     whole: bool = request_field(
         FLAG,
         False,
-        "count growing modes of all frequencies at every point; takes longer",
-        python="whether growing modes of all frequencies are counted at every point, rather than at one in 24",
+        "count growing modes of all frequencies at every point, as at few; takes longer",
+        python="whether growing modes of all frequencies are counted at every point, rather than at one in 24 of many",
     )
 
     @property

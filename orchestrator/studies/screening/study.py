@@ -29,6 +29,10 @@ STRETCH = 48
 # from so many on they are two stretches at least, so that two cores have work
 WORTH_TWO = 13
 
+FEW = 500
+"""Up to so many operating points with outages growth is counted at each, where that takes a part of what the point
+itself takes: 8 s of processor time of 25 s with 3,000 states. Only then is it known whether all are stable."""
+
 
 @dataclass(frozen=True)
 class Shard:
@@ -81,6 +85,7 @@ def plan_screening(case: Case, request: ScreeningRequest) -> ScreeningPlan:
                 anchor=anchor,
                 items=part,
                 whole=request.whole,
+                few=len(read.items) <= FEW,
                 sharing=sharing,
                 move_controls=request.move_controls,
                 runs=runs,

@@ -121,7 +121,7 @@ def test_nothing_is_searched_where_nothing_is_lost():
 def test_growth_at_other_frequencies_is_counted(outside, most_states, monkeypatch):
     """A full matrix of a few states takes the way of a large sparse one, and that of a middling one."""
     monkeypatch.setattr("orchestrator.studies.screening.modes.DENSE", 0)
-    monkeypatch.setattr("orchestrator.studies.screening.modes._MOST_STATES", most_states)
+    monkeypatch.setattr("orchestrator.studies.screening.modes.MOST_COUNTED", most_states)
     here = system([*KNOWN, outside], n=40)
     found = find_modes_here(
         here, -np.linspace(1.0, 900.0, len(here.names)), REGION, modes_of(here), count=True

@@ -633,6 +633,7 @@ def test_a_stretch_whose_end_fails_is_counted_at_its_last_point(
 ):
     """Growth that only the count sees must not be lost behind items without modes."""
     monkeypatch.setattr(modes, "DENSE", 0)
+    monkeypatch.setattr(study, "FEW", 0)
     result = screened(
         plan_screening(two_area[0], ScreeningRequest(day, "L", "gfor")), tmp_path / "points"
     )
@@ -643,16 +644,20 @@ def test_a_stretch_whose_end_fails_is_counted_at_its_last_point(
     assert {record.zeros for record in computed if record.counted} == {1}
 
 
-def test_a_stretch_counts_growth_at_its_ends_alone(two_area, day, tmp_path, monkeypatch):
-    """What stands between them is followed, and would take many times as long to count."""
+@pytest.mark.parametrize(("few", "between", "stable"), [(0, False, None), (500, True, True)])
+def test_growth_is_counted_everywhere_where_points_are_few(
+    few, between, stable, two_area, day, tmp_path, monkeypatch
+):
+    """Of many points those between the ends of a stretch are followed, and then no verdict is stable."""
     monkeypatch.setattr(modes, "DENSE", 0)
+    monkeypatch.setattr(study, "FEW", few)
     result = screened(
         plan_screening(two_area[0], ScreeningRequest(day, None, "gfor")), tmp_path / "points"
     )
-    counted = [
-        item.record.counted for item in result.items if item.record.status is Status.COMPUTED
-    ]
-    assert counted == [True, *[False] * (len(counted) - 2), True]
+    done = [item.record for item in result.items if item.record.status is Status.COMPUTED]
+    assert len(done) == len(result.items) > 2
+    assert [one.counted for one in done] == [True, *[between] * (len(done) - 2), True]
+    assert Summary(result).stable is stable
 
 
 @pytest.mark.parametrize("clocks", [0, 1, 3, 7])

@@ -85,7 +85,7 @@ def test_a_search_without_an_end_gives_way_to_all_eigenvalues(tmp_path, monkeypa
     monkeypatch.setattr(modes, search, without_an_end)
     (found,) = screened(two_area, tmp_path / "search", "name\nonly\n").items
     assert critical(found) == pytest.approx(critical(expected), rel=1e-6)
-    monkeypatch.setattr(modes, "_MOST_STATES", 10)
+    monkeypatch.setattr(modes, "MOST_COUNTED", 10)
     (refused,) = screened(two_area, tmp_path / "large", "name\nonly\n").items
     assert (refused.record.status, refused.record.text) == (
         Status.MODES,

@@ -137,7 +137,7 @@ def test_units_beyond_their_rating_are_in_the_verdict_and_the_report():
 
 
 def test_what_was_searched_in_the_range_alone_is_not_stable(screened):
-    """In a large system growth elsewhere is counted at the ends of stretches only."""
+    """With many items growth elsewhere is counted at the ends of stretches only, in a large system."""
     calm = next(item for item in screened.items if item.record.stable)
     uncounted = replace(calm, record=replace(calm.record, stable=None, counted=False))
     summary = Summary(replace(screened, items=[calm, uncounted]))
@@ -152,7 +152,7 @@ def test_an_item_is_stable_only_where_all_growth_was_counted(
     monkeypatch, tmp_path, counted, stable
 ):
     monkeypatch.setattr("orchestrator.studies.screening.modes.DENSE", 0)
-    monkeypatch.setattr("orchestrator.studies.screening.modes._MOST_STATES", 0)
+    monkeypatch.setattr("orchestrator.studies.screening.modes.MOST_COUNTED", 0)
     if not counted:
         monkeypatch.setattr("orchestrator.studies.screening.modes._elsewhere", lambda *_: None)
     path = tmp_path / "points.csv"
