@@ -5,6 +5,7 @@ from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.systems.coupling.master import Master
 
 _SHOWN = 3
+_TURN_BY_THEMSELVES = ("s", "rad")  # units of clocks, and of the angles of stiff sources
 
 
 def standing_apart(master: Master, model: LinearModel, zeros: int) -> list[str]:
@@ -12,10 +13,10 @@ def standing_apart(master: Master, model: LinearModel, zeros: int) -> list[str]:
 
     Their zeros are not counted among those that nothing restores: what nothing moves does not drift. An integrator of a
     controller that is off looks just like that, so that whoever believes it on must be told. A state in seconds is a
-    clock."""
+    clock, and one in radians the angle of a source that turns by itself."""
     if zeros + len(model.unmoved) <= 1:
         return []
-    names = [name for name in model.unmoved if _unit(master, name) != "s"]
+    names = [name for name in model.unmoved if _unit(master, name) not in _TURN_BY_THEMSELVES]
     if not names:
         return []
     text = (

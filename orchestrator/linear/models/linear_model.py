@@ -30,6 +30,10 @@ IDENTIFIED = "identified"
 in the FMU's file, or a model fitted to measurements at its inputs and outputs."""
 
 
+# a state stands still over a step where its own element of the map differs from 1 by less: rounding of a perturbation
+_STANDS = 1e-10
+
+
 @dataclass(frozen=True)
 class ShiftedSolver:
     """Solves (A − σI)·x = b with ``solve`` and (A − σI)ᴴ·x = b with ``solve_adjoint``."""
@@ -108,7 +112,7 @@ class LinearModel:
     def _is_unmoved(self) -> NDArray[np.bool_]:
         own = self.F.diagonal()
         others = sp.csr_array(self.F - sp.diags_array(own))
-        stands: NDArray[np.bool_] = own == (0.0 if self.step_size is None else 1.0)
+        stands = own == 0.0 if self.step_size is None else np.abs(own - 1.0) <= _STANDS
         for matrix in (others, self.G):
             stands &= np.asarray(abs(matrix).sum(axis=1)).ravel() == 0
         return stands

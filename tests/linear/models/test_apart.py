@@ -27,7 +27,7 @@ from orchestrator.studies.screening.study import plan_screening, run_screening
 
 SAID = (
     "states that nothing moves, as of a controller that is off or rests within a dead band: "
-    "grid.clock.t; their zeros"
+    "grid.clock.t, grid.source.theta; their zeros"
 )
 
 
@@ -48,7 +48,7 @@ def modes():
 def test_a_clock_is_not_told():
     found = modes()
     assert not any("nothing moves" in text for text in found.warnings)
-    assert "grid.clock.t" in found.model.unmoved
+    assert found.model.unmoved == ("grid.clock.t", "grid.source.theta")
 
 
 def test_an_integrator_that_is_off_is_told_beside_the_verdict(without_units):

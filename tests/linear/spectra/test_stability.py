@@ -201,7 +201,9 @@ def test_a_double_zero_that_the_perturbation_splits_is_no_growth():
     assert verdict.zeros == 2
     assert "2 eigenvalues are zero" in verdict.sentence()
     assert judge(model(split, STEP)).stable is False  # nothing says that it is an error
-    assert judge(model(np.diag([0.06, -1.0, -1.0, -1.0]), STEP), system=model(exact)).stable is False
+    assert (
+        judge(model(np.diag([0.06, -1.0, -1.0, -1.0]), STEP), system=model(exact)).stable is False
+    )
 
 
 def test_electromechanical_modes_outside_of_the_range_are_named_with_a_range_that_shows_them():
