@@ -158,10 +158,8 @@ class PodLoop:
         ``modes``: the modes that must not depend on the perturbation, where they are known."""
         system = where_given(lambda: self._continuous_model(setting))
         model = self._model(setting)
-        spectrum, decay = None, None
-        if values is not None:
-            spectrum = spectrum_of(model, values)
-            decay = None if system is None else decay_of(system, values)
+        spectrum = None if values is None else spectrum_of(model, values)
+        decay = None if values is None or system is None else decay_of(system, values)
         return examine(
             self._master,
             self._blocks,
