@@ -112,7 +112,8 @@ class LinearModel:
     def _is_unmoved(self) -> NDArray[np.bool_]:
         own = self.F.diagonal()
         others = sp.csr_array(self.F - sp.diags_array(own))
-        stands = own == 0.0 if self.step_size is None else np.abs(own - 1.0) <= _STANDS
+        still: NDArray[np.bool_] = np.abs(own - 1.0) <= _STANDS
+        stands = own == 0.0 if self.step_size is None else still
         for matrix in (others, self.G):
             stands &= np.asarray(abs(matrix).sum(axis=1)).ravel() == 0
         return stands
