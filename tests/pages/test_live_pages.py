@@ -118,6 +118,31 @@ def test_every_question_of_a_page_is_asked_by_tab_and_enter():
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
+def test_a_question_names_the_few_values_at_which_it_is_stable():
+    """Twelve values were named at which Kundur's system is unstable, for one at which it is stable."""
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as tools:
+        browser = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        view = browser.new_page(viewport={"width": 1280, "height": 900})
+        view.goto((ROOT / ".docs" / "live" / "kundur.html").as_uri())
+        said = {}
+        for name in ("grid.load_7.scale", "grid.load_9.scale", "grid.X_tie_8_9_2"):
+            view.get_by_role("button", name=f"Which {name} damps most?").click()
+            said[name] = view.inner_text("#else-said").partition("%. ")[2].partition(" show it")[0]
+        view.evaluate(
+            "dragSaved('grid.load_9.scale', 0.9 * SAVED.grid['grid.load_9.scale'].find(x => x > 0.5))"
+        )
+        beside = view.inner_text("#outside")
+        browser.close()
+    assert said == {
+        "grid.load_7.scale": "Unstable at all of them.",
+        "grid.load_9.scale": "Unstable at 0.2, 0.2615, 1, 1.308.",
+        "grid.X_tie_8_9_2": "Stable at 0.022 only.",
+    }
+    assert beside.startswith("Computed nearby, with grid.load_9.scale = 0.5848: stable")
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
 def test_no_page_is_wider_than_the_smallest_telephone():
     """A path in a heading, and the buttons beside the tabs, once were."""
     playwright = pytest.importorskip("playwright.sync_api")

@@ -185,18 +185,25 @@ class Stability(NoTruth):
         """The figures behind the verdict's word."""
         if self.mode is None or self.stable is None:
             return self.reason or "there is no eigenvalue but zeros"
-        value = self.mode.eigenvalue
-        states = ", ".join(
-            f"{name} {factor:.2f}" for name, factor in self.mode.participation[:_STATES_NAMED]
-        )
-        where = f"{value.real:+.4g} 1/s ({place(value, self.step_size)}; {states})"
         tail = f"; {self.reason}" if self.reason else ""
         if self.zeros > 1:
             tail += f"; {zeros_in_words(self.zeros)}"
         if self.stable:
+            where = self._where(self.mode)
             return f"the largest real part of all {self.eigenvalues} eigenvalues is {where}{tail}"
+        return f"{self.growth(self.mode)}; cause: {self._why()}{tail}"
+
+    def growth(self, mode: Mode) -> str:
+        """How fast a growing ``mode`` grows, who takes part in it, and how many modes grow."""
         more = f"; {self.growing} modes grow" if self.growing > 1 else ""
-        return f"a mode grows at {where}{more}; cause: {self._why()}{tail}"
+        return f"a mode grows at {self._where(mode)}{more}"
+
+    def _where(self, mode: Mode) -> str:
+        states = ", ".join(
+            f"{name} {factor:.2f}" for name, factor in mode.participation[:_STATES_NAMED]
+        )
+        value = mode.eigenvalue
+        return f"{value.real:+.4g} 1/s ({place(value, self.step_size)}; {states})"
 
     def _why(self) -> str:
         rate = self.continuous_growth_rate

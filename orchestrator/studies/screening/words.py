@@ -286,14 +286,13 @@ def _but_slowly(summary: Summary) -> str:
 
 
 def _least(item: ScreenedItem) -> str:
-    outside = growth_outside(item.record)
-    if outside:
-        return f": {outside}"
-    one = least_of(item)
-    if one is None:
-        return ""
-    who = ", ".join(f"{name} {share:.2f}" for name, share in one.participation(2))
-    return f": {one.frequency:.3f} Hz, {one.damping:.2f} % ({who})"
+    """Tell the least damped critical mode, unless it is damped and another grows, and what grows beside it."""
+    outside, one = growth_outside(item.record), least_of(item)
+    parts = [outside] if outside else []
+    if one is not None and (one.damping < 0 or not outside):
+        who = ", ".join(f"{name} {share:.2f}" for name, share in one.participation(2))
+        parts.insert(0, f"{one.frequency:.3f} Hz, {one.damping:.2f} % ({who})")
+    return f": {', and '.join(parts)}" if parts else ""
 
 
 def growth_outside(record: ItemRecord) -> str:

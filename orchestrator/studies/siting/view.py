@@ -184,14 +184,18 @@ def _called(seen: SeenMode) -> str:
 
 def sureness(result: SiteResult) -> list[str]:
     before = result.intact.modes[0].mode.damping_percent
+    found = [_confirmed(result, one, before) for one in result.confirmations]
+    return [*_unstable(result), *(found or ["not confirmed by coupled FMUs"])]
+
+
+def _unstable(result: SiteResult) -> list[str]:
+    """Return a sentence on the situations in which something grows without the device, where there are any."""
     bad = [
         f"{at.name} ({_growing(at)})"
         for at in result.worst_first
         if at.found.stability.stable is False
     ]
-    said = [f"UNSTABLE without the device: {few(bad, _NAMED)}"] if bad else []
-    found = [_confirmed(result, one, before) for one in result.confirmations]
-    return [*said, *(found or ["not confirmed by coupled FMUs"])]
+    return [f"UNSTABLE without the device: {few(bad, _NAMED)}"] if bad else []
 
 
 def _growing(at: Situation) -> str:
@@ -199,7 +203,9 @@ def _growing(at: Situation) -> str:
     least = at.modes[0]
     if least.mode.damping_percent < 0:
         return _called(least)
-    return f"{at.found.stability.because()}; least damped in the range: {_called(least)}"
+    stability = at.found.stability
+    grows = stability.growth(stability.mode) if stability.mode else stability.because()
+    return f"{grows}; least damped in the range: {_called(least)}"
 
 
 def _confirmed(result: SiteResult, one: Confirmation, before: float) -> str:
@@ -459,13 +465,13 @@ def _page(result: SiteResult) -> str:
         f"{result.case.table.title or result.case.name}: where to put {device_title(result)}",
     )
     shade = "good" if result.agrees and result.confirmations else "soft"
-    told = sureness(result)
-    beside = told[: len(told) - max(1, len(result.confirmations))] if result.confirmations else told
-    lines = "".join(f"<li>{escape(text)}</li>" for text in (*beside, *remarks(result)))
+    unconfirmed = [] if result.confirmations else sureness(result)[-1:]
+    lines = "".join(f"<li>{escape(text)}</li>" for text in (*unconfirmed, *remarks(result)))
+    unstable = "".join(f'<p class="bad">{escape(text)}</p>' for text in _unstable(result))
     first, further = answer_in_parts(result)
     behind = f"<p>{escape(_as_sentence(further))}</p>" if further else ""
     findings = (
-        f'<div class="findings"><p class="verdict"><b class="{shade}">{escape(first)}</b></p>{behind}'
+        f'<div class="findings"><p class="verdict"><b class="{shade}">{escape(first)}</b></p>{unstable}{behind}'
         f'{_confirmed_table(result)}<ul class="soft">{lines}</ul></div>'
     )
     content = [("Map", "".join(_map(result, seen, figures) for seen in result.intact.modes[:3]))]

@@ -136,6 +136,26 @@ def test_units_beyond_their_rating_are_in_the_verdict_and_the_report():
     assert "beyond its rating" not in verdict_sentence(Summary(calm))
 
 
+def test_a_swing_that_grows_is_told_before_what_grows_beside_it(screened):
+    """Of Kundur's system after an outage the slower growth outside of the range once stood alone in the verdict."""
+    item = screened.items[0]
+    grows = replace(
+        item.record,
+        stable=False,
+        eigenvalues=np.array([0.2344 + 4.7276j]),
+        critical=(0,),
+        shares={"sg2": np.array([0.7]), "sg3": np.array([0.19])},
+        growing_elsewhere=1,
+        fastest=(0.0819, 0.0),
+    )
+    sentence = verdict_sentence(
+        Summary(replace(screened, items=[replace(item, record=grows, trajectories=(0,))]))
+    )
+    swing = "0.752 Hz, -4.95 % (sg2 0.70, sg3 0.19)"
+    beside = "1 eigenvalue grows outside of the range, by 0.0819 1/s without an oscillation"
+    assert f": {swing}, and {beside}" in sentence
+
+
 def test_what_was_searched_in_the_range_alone_is_not_stable(screened):
     """With many items growth elsewhere is counted at the ends of stretches only, in a large system."""
     calm = next(item for item in screened.items if item.record.stable)

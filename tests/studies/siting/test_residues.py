@@ -1,6 +1,7 @@
 """How a device at a bus moves a mode: predicted and by coupled FMUs, and what would be wrong in silence."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from orchestrator.studies.modes.modes import running
 from orchestrator.studies.siting import placing, residues
 from orchestrator.studies.siting.placing import ideal_support
 from orchestrator.studies.siting.study import SiteRequest, find_sites
-from orchestrator.studies.siting.view import answer, open_points, remarks, sureness
+from orchestrator.studies.siting.view import Siting, answer, open_points, remarks, sureness
 from tests.studies.screening.five_machines import five_machines
 
 
@@ -139,6 +140,10 @@ def test_what_grows_beside_damped_modes_of_the_range_is_named():
         "UNSTABLE without the device: intact (a mode grows at +0.005153 1/s (no oscillation; "
     )
     assert "; least damped in the range: inter-area, 0.542 Hz, 3.27 %)" in sureness(found)[0]
+    page = Siting(found).page_text()
+    (red,) = re.findall(r'</p><p class="bad">(UNSTABLE without the device: .*?)</p>', page)
+    assert page.count("UNSTABLE without") == 1  # in red, below the answer, and once
+    assert "cause" not in red  # which `gfor modes` tells
 
 
 def test_the_json_has_a_shift_for_each_bus_and_mode(gfor, tmp_path):

@@ -93,14 +93,21 @@ function askBestScenario() {
   const others = sorted.slice(1, Math.min(4, sorted.length - 1)).map(one => `${titleOf(one)} ${fixed(leastDampingOf(one.answer), 2)} %`);
   sayElse(`Of ${tried.length} scenarios at these values, ${titleOf(sorted[0])} damps most: ${swingOf(sorted[0].answer)}; ${others.length ? `then ${others.join(", ")}; ` : ""}least does ${titleOf(sorted.at(-1))}, ${fixed(leastDampingOf(sorted.at(-1).answer), 2)} %. `, show);
 }
+// At which of some values the system is stable: the fewer ones are named.
+function stabilityOf(tried) {
+  const [stable, unstable] = [true, false].map(verdict => tried.filter(one => one.answer.modes.scenarios[0].stable === verdict).map(one => number(one.value)));
+  if (!unstable.length) return "Stable at all of them. ";
+  if (unstable.length === tried.length) return "Unstable at all of them. ";
+  return stable.length + unstable.length === tried.length && stable.length < unstable.length ? `Stable at ${stable.join(", ")} only. ` : `Unstable at ${unstable.join(", ")}. `;
+}
 // ... and which value of a slider damps most, the others as they are.
 function askBest(name) {
   const others = SAVED.movers ? {} : Object.fromEntries(Object.keys(SAVED.grid).map(one => [one, heldNear(one, state.values[one] ?? ownOf(one))]));
   const answerAt = value => { const at = SAVED.movers && value === ownOf(name) ? {} : { ...others, [name]: value }; return SAVED.answers.find(one => one.scenario === state.scenario && Object.keys(one.values).length === Object.keys(at).length && Object.entries(at).every(([n, v]) => one.values[n] === v))?.answer; };
   const tried = SAVED.grid[name].map(value => ({ value, answer: answerAt(value) })).filter(one => one.answer && leastOf(one.answer.modes.scenarios[0].modes));
-  const best = tried.reduce((one, other) => (leastDampingOf(other.answer) > leastDampingOf(one.answer) ? other : one)), unstable = tried.filter(one => one.answer.modes.scenarios[0].stable === false);
+  const best = tried.reduce((one, other) => (leastDampingOf(other.answer) > leastDampingOf(one.answer) ? other : one));
   const show = make("button", {}, "show it");
   show.addEventListener("click", () => setSaved(name, best.value));
   const range = `${number(tried[0].value)} to ${number(tried.at(-1).value)}`;
-  sayElse(`Of ${tried.length} computed values of ${name} from ${range}, ${number(best.value)} damps most: ${swingOf(best.answer)}. `, unstable.length ? `Unstable at ${unstable.map(one => number(one.value)).join(", ")}. ` : "Stable at all of them. ", show);
+  sayElse(`Of ${tried.length} computed values of ${name} from ${range}, ${number(best.value)} damps most: ${swingOf(best.answer)}. `, stabilityOf(tried), show);
 }
