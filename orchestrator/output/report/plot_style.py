@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ from orchestrator.core.safe_files import write_bytes
 from orchestrator.output.report.colours import GRID_LINES
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.figure import Figure
 
 STYLE: dict[Any, Any] = {
@@ -45,9 +46,15 @@ def _to_the_letter(figure: Figure) -> None:
     """Titles, labels and legends are foreign text: two dollar signs in it begin no formula. Ticks keep theirs."""
     from matplotlib.text import Text  # noqa: PLC0415 - a second to import
 
-    numbers: set[Any] = set()
-    for axes in figure.axes:
-        for axis in (axes.xaxis, axes.yaxis):
-            numbers |= set(axis.findobj(Text)) - {axis.label}
-    for text in set(figure.findobj(Text)) - numbers:
-        text.set_parse_math(False)
+    for artist in _apart_from_ticks(figure):
+        if isinstance(artist, Text):
+            artist.set_parse_math(False)
+
+
+def _apart_from_ticks(artist: Artist) -> Iterator[Artist]:
+    """Yield all that an artist holds; of an axis its label alone, as whoever asks for ticks makes them."""
+    from matplotlib.axis import Axis  # noqa: PLC0415 - a second to import
+
+    for child in [artist.label] if isinstance(artist, Axis) else artist.get_children():
+        yield child
+        yield from _apart_from_ticks(child)
