@@ -128,6 +128,43 @@ def test_derivatives_of_a_network_agree_in_both_directions_and_with_differences(
     assert np.count_nonzero(forward) > len(follows) / 2
 
 
+@pytest.mark.parametrize("seed", range(2))
+def test_voltages_that_are_read_alone_are_those_among_all_outputs(seed, tmp_path):
+    """A network's other outputs need not be computed for them; nothing that is read later is older for it."""
+    model, rng = build_model("two_area_phasor_grid"), np.random.default_rng(seed)
+    at, folder = model.value_references, unpacked(tmp_path, "two_area_phasor_grid")
+    every = [at[v.name] for v in (*model.outputs, *model.states)]
+    rates = [at[f"der({s.name})"] for s in model.states]
+    voltages = [at[v.name] for v in model.outputs if ".v_" in v.name]
+    inputs = [at[v.name] for v in model.inputs]
+    tunable = [at[p.name] for p in model.parameters if p.tunable and p.type == "Real"]
+    by_parts, at_once = (Host(folder).initialise() for _ in range(2))
+    assert voltages
+    seen = set()
+    for k in range(60):
+        place = rng.choice([*inputs, *rng.choice(tunable, 2)])
+        by_parts_had = by_parts.fmu.getReal([place])[0]
+        for host in (by_parts, at_once):
+            host.fmu.setReal([place], [by_parts_had * 1.01 + 1e-3 * (place in inputs)])
+        asked = [voltages, voltages[:1], [*voltages, *inputs], [*rates, *voltages]][k % 4]
+        answers = [by_parts.fmu.getReal(asked)]
+        whole = dict(
+            zip(
+                [*every, *rates, *inputs],
+                at_once.fmu.getReal([*every, *rates, *inputs]),
+                strict=True,
+            )
+        )
+        answers.append([whole[reference] for reference in asked])
+        assert answers[0] == answers[1]
+        if k % 3 == 0:
+            assert by_parts.fmu.getReal(every) == [whole[reference] for reference in every]
+        if k % 5 == 0:
+            assert by_parts.step(k * 1e-3) == at_once.step(k * 1e-3) == OK
+        seen.add(tuple(answers[0]))
+    assert len(seen) > 40
+
+
 DAMAGED = {
     "there is no file model.bin": lambda data, other: None,
     "is no model": lambda data, other: data[:40],
