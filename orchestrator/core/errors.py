@@ -263,11 +263,14 @@ class CaseError(InputError):
 
 
 class StartError(CaseError):
-    """A component refuses to start with its values, or from its operating point."""
+    """A component refuses to start with its values, or from its operating point; ``others``: of components that do
+    so as well."""
 
-    def __init__(self, source: str, problem: Problem, component: str) -> None:
+    def __init__(
+        self, source: str, problem: Problem, component: str, others: Sequence[Problem] = ()
+    ) -> None:
         self.component = component
-        super().__init__(source, [problem])
+        super().__init__(source, [problem, *others])
 
 
 class BindingError(CaseError):

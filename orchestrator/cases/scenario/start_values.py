@@ -19,13 +19,14 @@ from orchestrator.cases.form.remedies import KEEPING_LIMITS
 from orchestrator.cases.networks.controls import Control, solve_with_controls
 from orchestrator.cases.networks.load_models import FlowLaws
 from orchestrator.cases.scenario.flow_units import flow_unit
-from orchestrator.core.errors import ErrorKind, InputError
+from orchestrator.core.errors import ErrorKind, InputError, few
 from orchestrator.systems.coupling.system import ComponentPlan, System
 
 # lower limits of the power of governors without losses
 _LEAST_POWER = ("governor.V_MIN", "governor.P_MIN")
 # such a limit of a unit that is out of service [pu]: not at its edge while it turns idle
 _IDLE = -0.1
+_SHOWN = 8  # further units beyond what they can be asked for that one error names
 
 
 @dataclass(frozen=True)
@@ -99,9 +100,12 @@ def start_from_power_flow(
             f"{bus}.theta_0": cmath.phase(voltage),
         }
     _set_following(system.components[grid], loads, flow.voltages)
+    excesses: dict[str, _Excess] = {}
     for name, bus in units.items():
         most = LARGEST_POWER_ON_BASE if name in (ratings or {}) else LARGEST_POWER
-        _start_unit(name, system.components[name], flow.voltages[bus], flow.powers[name], most)
+        excess = _start_unit(system.components[name], flow.voltages[bus], flow.powers[name], most)
+        excesses |= {name: excess} if excess else {}
+    _refuse(excesses)
     for name in (
         unit.name for unit in feeding if not unit.connected and unit.name not in returning
     ):
@@ -278,9 +282,19 @@ def _let_idle(plan: ComponentPlan) -> None:
             plan.parameters[limit] = _IDLE
 
 
+@dataclass(frozen=True)
+class _Excess:
+    """A power at the start [pu of its rating] beyond what a unit can be asked for."""
+
+    variable: str
+    value: float
+    most: float
+
+
 def _start_unit(
-    name: str, plan: ComponentPlan, voltage: complex, power: complex, usual: float
-) -> None:
+    plan: ComponentPlan, voltage: complex, power: complex, usual: float
+) -> _Excess | None:
+    """Give a unit its start, or return what it cannot be asked for."""
     start = {
         "P_0": power.real,
         "Q_0": power.imag,
@@ -291,10 +305,22 @@ def _start_unit(
         declared = plan.description.variables[variable].maximum
         most = math.inf if declared is None else min(declared, usual)
         if abs(start[variable]) > most:
-            kept = f", or keep its limits: {KEEPING_LIMITS}" * (variable == "Q_0")
-            raise InputError(
-                f"{name} would have to feed {variable} = {start[variable]:.4g} pu of its rating, more than {most:g}; "
-                f"raise its S_n, or move load and generation{kept}",
-                kind=ErrorKind.START,
-            )
+            return _Excess(variable, start[variable], most)
     plan.parameters |= start
+    return None
+
+
+def _refuse(excesses: Mapping[str, _Excess]) -> None:
+    """Refuse units that cannot be asked for what the power flow gives them, all together."""
+    if not excesses:
+        return
+    (name, one), *others = excesses.items()
+    kept = f", or keep its limits: {KEEPING_LIMITS}" * (one.variable == "Q_0")
+    text = (
+        f"{name} would have to feed {one.variable} = {one.value:.4g} pu of its rating, more than {one.most:g}; "
+        f"raise its S_n, or move load and generation{kept}"
+    )
+    if others:
+        told = [f"{unit} ({x.variable} = {x.value:.4g})" for unit, x in others]
+        text += f"; so would {few(told, _SHOWN)}"
+    raise InputError(text, kind=ErrorKind.START)

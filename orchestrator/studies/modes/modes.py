@@ -49,7 +49,7 @@ from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.simulation.engine import Engine
 from orchestrator.studies.modes.mode_identity import NamedSystem, settle_names
 from orchestrator.studies.modes.naming import matching, named_modes
-from orchestrator.studies.modes.start_errors import start_error
+from orchestrator.studies.modes.start_errors import start_errors
 from orchestrator.systems.coupling.coupled import open_plan
 from orchestrator.systems.coupling.master import Master
 
@@ -175,7 +175,7 @@ def running(
             threads,
         )
     except ComponentError as error:
-        raise start_error(prepared, error) or error from error
+        raise start_errors(prepared, error) or error from error
 
 
 def modes_of(

@@ -6,6 +6,8 @@ from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import ComponentError, ErrorKind, Problem, StartError
 from orchestrator.devices.fmi.instance import is_ours
 from orchestrator.devices.fmi.refused_calls import refuses_to_start
+from orchestrator.systems.coupling.coupled import refusal_to_start
+from orchestrator.systems.coupling.system import ComponentPlan
 
 _PREFACE = "parameters cannot be used: "
 """Begins what our models log of values that do not fit together, and is said by "cannot start" already. By FMI a model
@@ -14,40 +16,77 @@ can give its reason as a text only; a text of another's FMU stays as it is."""
 _FULL = 1.0  # apparent power [pu] beyond which a unit is asked for more than its rating
 
 
+_MOST_OTHERS = 8
+"""So many further components that cannot start are told with the first; the others are counted."""
+
+
+def start_errors(prepared: PreparedScenario, error: ComponentError) -> StartError | None:
+    """The error of a component that refused to initialise, with those of all other units that do; see `start_error`."""
+    first = start_error(prepared, error)
+    if first is None:
+        return None
+    units = [
+        name
+        for name, plan in prepared.system.components.items()
+        if name != first.component and "P_0" in plan.description.variables
+    ]
+    ours = [name for name in units if is_ours(prepared.system.components[name].description.path)]
+    refused = {name: refusal_to_start(name, prepared.system.components[name]) for name in ours}
+    others = [
+        Problem(prepared.places[name], _text(prepared, refusal, name), ErrorKind.START)
+        for name, refusal in refused.items()
+        if refusal is not None and refuses_to_start(refusal) and name in prepared.places
+    ]
+    shown, rest = others[:_MOST_OTHERS], others[_MOST_OTHERS:]
+    if rest:
+        text = f"scenario {prepared.name!r}: {len(rest)} more units cannot start from their operating point"
+        shown.append(Problem(prepared.case.source, text, ErrorKind.START))
+    return StartError(prepared.case.source, first.problems[0], first.component, shown)
+
+
 def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError | None:
     """The error of a component that refused to initialise; None for any other call, and where its process died."""
     if not refuses_to_start(error) or error.component not in prepared.places:
         return None
     name, plan = error.component, prepared.system.components[error.component]
-    ours = is_ours(plan.description.path)
-    said = error.log.removeprefix(f"{name}: ")
-    said = said.removeprefix(_PREFACE) if ours else said
-    said = said or "the FMU says no more than that its initialisation failed"
-    given = {
-        v: plan.number(v) for v in ("P_0", "Q_0", "S_n", "v_0") if v in plan.description.variables
-    }
-    most = power_limits(plan, given["Q_0"])[1] if {"P_0", "Q_0"} <= set(given) else float("inf")
-    share = given["P_0"] / most if "P_0" in given and most > 0 else 0.0
-    need = f"would need {100 * share:.0f} % of what its limits allow, and " if share > 1 else ""
-    text = f"scenario {prepared.name!r}: {name} {need}cannot start: {said}"
-    if {"P_0", "Q_0", "S_n"} <= set(given):
-        computed = prepared.power_flow is not None and name in prepared.power_flow.powers
-        by = "the power flow asks it for" if computed else "it is to start at"
-        voltage = f" at v = {given['v_0']:.4g} pu" if "v_0" in given else ""
-        powers = f"P_0 = {given['P_0']:.4g} and Q_0 = {given['Q_0']:.4g} pu"
-        text += f"; {by} {powers} of S_n = {given['S_n']:g} MVA{voltage}"
-        if computed and (need or abs(complex(given["P_0"], given["Q_0"])) > _FULL):
+    computed = prepared.power_flow is not None and name in prepared.power_flow.powers
+    text = _text(prepared, error, name)
+    if computed and {"P_0", "Q_0", "S_n"} <= {*plan.description.variables}:
+        asked = abs(complex(plan.number("P_0"), plan.number("Q_0")))
+        if _share(plan) > 1 or asked > _FULL:
             text += (
                 ". Give others more of the power (P_0 of units; a screening of outages shares it by itself), lower the "
                 "loads or the reactive power around it, or correct a limit that is wrong in its data"
             )
-        grid = prepared.system.components.get(prepared.grid) if computed else None
-        fed = feeding_loads(prepared.network, grid, given["S_n"])
+        grid = prepared.system.components.get(prepared.grid)
+        fed = feeding_loads(prepared.network, grid, plan.number("S_n"))
         text += f"; {fed}" if fed else ""
     # The same values are refused again by a model of ours; an FMU of others may lack a licence today.
-    kind = ErrorKind.START if ours else ErrorKind.FMU
-    return StartError(
-        prepared.case.source,
-        Problem(prepared.places[name], text, kind),
-        name,
-    )
+    kind = ErrorKind.START if is_ours(plan.description.path) else ErrorKind.FMU
+    return StartError(prepared.case.source, Problem(prepared.places[name], text, kind), name)
+
+
+def _share(plan: ComponentPlan) -> float:
+    """Active power at the start, of what the unit's limits allow."""
+    if not {"P_0", "Q_0"} <= {*plan.description.variables}:
+        return 0.0
+    most = power_limits(plan, plan.number("Q_0"))[1]
+    return plan.number("P_0") / most if most > 0 else 0.0
+
+
+def _text(prepared: PreparedScenario, error: ComponentError, name: str) -> str:
+    """Return the reason that a component gives why it cannot start, with its operating point."""
+    plan = prepared.system.components[name]
+    said = error.log.removeprefix(f"{name}: ")
+    said = said.removeprefix(_PREFACE) if is_ours(plan.description.path) else said
+    said = said or "the FMU says no more than that its initialisation failed"
+    share, there = _share(plan), {*plan.description.variables}
+    need = f"would need {100 * share:.0f} % of what its limits allow, and " if share > 1 else ""
+    text = f"scenario {prepared.name!r}: {name} {need}cannot start: {said}"
+    if {"P_0", "Q_0", "S_n"} <= there:
+        computed = prepared.power_flow is not None and name in prepared.power_flow.powers
+        by = "the power flow asks it for" if computed else "it is to start at"
+        voltage = f" at v = {plan.number('v_0'):.4g} pu" if "v_0" in there else ""
+        powers = f"P_0 = {plan.number('P_0'):.4g} and Q_0 = {plan.number('Q_0'):.4g} pu"
+        text += f"; {by} {powers} of S_n = {plan.number('S_n'):g} MVA{voltage}"
+    return text

@@ -228,6 +228,19 @@ def _begin(component: Component, plan: ComponentPlan, stop_time: float | None) -
     component.set(plan.parameters)
 
 
+def refusal_to_start(name: str, plan: ComponentPlan) -> ComponentError | None:
+    """Return the error with which a component of ours refuses to start by itself; None where it starts."""
+    with unpacked(plan.description.path) as folder, open_plan(name, plan, folder) as component:
+        try:
+            _begin(component, plan, None)
+            component.enter_initialization_mode()
+            component.set(plan.inputs)
+            component.exit_initialization_mode()
+        except ComponentError as error:
+            return error
+    return None
+
+
 def _check_taken(name: str, component: Component, plan: ComponentPlan) -> None:
     try:
         values = component.values(plan.parameters)

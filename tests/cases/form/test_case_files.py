@@ -577,6 +577,15 @@ def test_one_mistake_in_a_network(written, old, new, words):
     assert problems_of(lambda: written(text).prepare())[0].startswith(words)
 
 
+def test_all_units_beyond_what_they_can_be_asked_for_are_told(written):
+    text = THREE_BUSES.replace('S_n = "1000 MVA"', 'S_n = "100 MVA"').replace(
+        'S_n = "500 MVA"', 'S_n = "5 MVA"'
+    )
+    (told,) = problems_of(lambda: written(text).prepare())
+    assert "sg would have to feed P_0 = " in told
+    assert "; so would vsc (Q_0 = " in told
+
+
 def test_a_line_to_a_bus_that_is_not_in_the_list(written):
     text = THREE_BUSES.replace('to = "b3"', 'to = "b4"')
     assert any("'b4'" in problem for problem in problems_of(written(text).prepare))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from orchestrator.core.errors import CosimError
+from orchestrator.core.errors import CosimError, StartError
 from orchestrator.studies.modes.modes import in_service, running
 from tests.support.scenarios import prepare_one
 
@@ -67,6 +67,22 @@ def test_a_unit_that_cannot_start_names_the_load(prepared):
     scenario = prepared(-1600)
     with pytest.raises(CosimError, match=r"cannot start: .* below zero: d3 feeds 1600 MW"):
         running(in_service(scenario)).close()
+
+
+def test_all_units_that_cannot_start_are_told_together(tmp_path):
+    """One of 1.5 pu at each bus with a converter; what to do about it stands with the first."""
+    unit = CASE[CASE.index("[components.vsc]") :]
+    text = CASE + unit.replace("components.vsc", "components.another").replace('"b2"', '"b3"')
+    (tmp_path / "case.toml").write_text(text.replace("P_0 = 0.8", "P_0 = 1.5"), encoding="utf-8")
+    with pytest.raises(StartError) as failure:
+        running(in_service(prepare_one(tmp_path / "case.toml"))).close()
+    assert failure.value.component == "vsc"
+    first, second = (problem.text for problem in failure.value.problems)
+    assert ": vsc would need" in first
+    assert "Give others more of the power" in first
+    assert ": another would need" in second
+    assert "the power flow asks it for P_0 = 1.5" in second
+    assert "Give others more of the power" not in second
 
 
 def test_a_unit_that_cannot_start_for_another_reason_names_none(prepared):
