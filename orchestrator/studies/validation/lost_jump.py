@@ -99,11 +99,7 @@ SMOOTHINGS = (
 )
 
 
-SMOOTHINGS_OF_MAGNITUDE = (
-    Smoothing(0.1, _lost_by_lag(0.1)),
-    *(Smoothing(length, _lost_by_mean(length, 0.0)) for length in (0.04, 0.1)),
-    Smoothing(0.1, _lost_by_mean(0.1, 0.5)),
-)
+SMOOTHINGS_OF_MAGNITUDE = (Smoothing(0.1, _lost_by_lag(0.1)),)  # of transducers
 ANGLE = SmoothedPart("an angle", QuestionKind.LOST_JUMP, _angles, 1j, math.degrees(1.0))
 MAGNITUDE = SmoothedPart(
     "a magnitude", QuestionKind.LOST_STEP, lambda voltage: np.log(np.abs(voltage)), 1 + 0j, 1.0

@@ -191,7 +191,8 @@ def _lost_step(x: Figures) -> str:
         f"the magnitude of the voltage lacks up to {x['jump']:.3g} pu from {x['at']:.4g} s on, as one that is smoothed "
         f"over {1000 * x['length']:.3g} ms does; without that the error falls from {x['error']:.3g} to "
         f"{x['left']:.3g} pu (rms): was it filtered by the recorder? Give the magnitude as it was measured, with "
-        "--channel 'v=COLUMN'"
+        + Option.CHANNEL
+        + " 'v=COLUMN'"
     )
 
 
@@ -199,8 +200,10 @@ def _angle_jump(x: Figures) -> str:
     return (
         f"the angle jumps by {x['jump']:+.3g} deg at {x['at']:.4g} s, where the magnitude stays, and P and Q move by "
         f"{x['seen']:.2g} pu, the model's by {x['asked']:.2g} pu: did the recorder take another reference for the "
-        "angle, or lose the time? What comes after is not judged. Give an angle without the jump, with --channel "
-        "'angle=COLUMN', or the part before, with " + Option.STOP
+        "angle, or lose the time? What comes after is not judged. Give an angle without the jump, with "
+        + Option.CHANNEL
+        + " 'angle=COLUMN', or the part before, with "
+        + Option.STOP
     )
 
 
@@ -218,7 +221,7 @@ def _lagged(x: Figures) -> str:
     return (
         f"{which} {follows} the model's like one behind a lag of {1000 * x['lag']:.3g} ms, and beside that the error "
         f"falls from {x['error']:.2g} to {x['left']:.2g} pu (rms): does the recorder filter it, or has the plant a lag "
-        "that the model lacks? Give it as it was measured, with --channel"
+        "that the model lacks? Give it as it was measured, with " + Option.CHANNEL
     )
 
 

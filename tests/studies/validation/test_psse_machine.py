@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.signal import lfilter
 
 import orchestrator as gfor_in_python
 
@@ -100,6 +101,12 @@ def test_pss_es_machine_comes_back_by_its_own_terminal_voltage(case, recording):
     assert after["mean_abs_error_pu"].max() < 5e-4
 
 
+def behind_a_lag(frame, column, seconds=0.05):
+    part = 1 - np.exp(-0.005 / seconds)
+    first = frame[column].iloc[0]
+    return frame.assign(**{column: lfilter([part], [1, part - 1], frame[column] - first) + first})
+
+
 def test_the_parameters_of_pss_es_machine_are_found_again(case, recording):
     off = {"machine.machine.H": 5.0, "machine.exciter.K": 26.0}
     found = validated(case, recording, values=off, fit=["machine.H", "exciter.K"])
@@ -152,6 +159,16 @@ SPOILT = {
     "P cut by the recorder's range": (
         lambda f: f.assign(p_mw=f.p_mw.clip(upper=f.p_mw.quantile(0.97))),
         "clipped",
+    ),
+    "Q cut by the recorder's range": (
+        lambda f: f.assign(q_mvar=f.q_mvar.clip(upper=f.q_mvar.quantile(0.95))),
+        "clipped",
+    ),
+    "Q behind a lag": (lambda f: behind_a_lag(f, "q_mvar"), "behind a lag"),
+    "a magnitude behind a lag": (lambda f: behind_a_lag(f, "v_pu"), "magnitude lacks a step"),
+    "an angle that jumps": (
+        lambda f: f.assign(angle_deg=f.angle_deg + 20 * (f.index > 3)),
+        "angle jumps alone",
     ),
 }
 
