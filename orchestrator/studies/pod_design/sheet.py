@@ -266,7 +266,7 @@ def _of_the_bounds(d: PodDesign) -> Iterable[str]:
     elif d.final is d.designed and d.active_bound == "lower":
         yield (
             f"the sensitivity asks for K = {d.unbounded_gain:.4g} pu, and the bounds allow no less than "
-            f"{d.final.setting.gain:.4g} pu (both on the converter's base S_n): "
+            f"{d.final.setting.gain:.4g} pu (both on the base S_n of the converter): "
             + Option.GAIN_BOUNDS
             + f" 0:{d.request.bounds(search=True)[1]:g} "
             + Option.REFINE

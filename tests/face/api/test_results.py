@@ -176,7 +176,7 @@ def test_a_design_is_that_of_the_command(gfor, tmp_path, two_area):
     assert "requirement met" in design._repr_html_()
     assert (
         "the sensitivity asks for K = 18.45 pu, and the bounds allow no less than 200 pu "
-        "(both on the converter's base S_n): gain_bounds 0" in design.verdict
+        "(both on the base S_n of the converter): gain_bounds 0" in design.verdict
     )
     assert design.verdict in design._repr_html_()
     assert design.table().loc["with it", "damping_percent"] > 20
