@@ -4,13 +4,14 @@ import cmath
 import warnings
 
 import numpy as np
-import pandapower as pp
 import pytest
-from pandapower import networks
 
 from orchestrator.cases.case import load_case
 from orchestrator.studies.modes.modes import compute_modes
 from orchestrator.studies.runs.run import run_scenario
+from tests.support.late import LateLibrary
+
+pp, networks = LateLibrary("pandapower"), LateLibrary("pandapower.networks")
 
 pytestmark = pytest.mark.reproduction
 

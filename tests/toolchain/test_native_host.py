@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 
 import fmpy
-import lief
 import pytest
 
 from fmus.toolchain.catalogue import build_model
@@ -15,6 +14,9 @@ from fmus.toolchain.compiler import TARGETS
 from fmus.toolchain.exporter import export
 from fmus.toolchain.native_fmu import NativeFmu
 from tests.support.host import OK, H
+from tests.support.late import LateLibrary
+
+lief = LateLibrary("lief")
 
 HOST = Path(__file__).with_name("host") / "host.c"
 CALLS = (

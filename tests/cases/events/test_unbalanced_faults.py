@@ -6,9 +6,7 @@ phases or to earth, an open pole a phase without a conductor."""
 import re
 
 import numpy as np
-import pandapower as pp
 import pytest
-from pandapower import shortcircuit as sc
 
 import orchestrator as gfor
 from fmus.grid.network import OPEN_CHARGING
@@ -23,6 +21,9 @@ from orchestrator.systems.coupling.events import (
     PoleSwitching,
 )
 from orchestrator.systems.coupling.master import Master
+from tests.support.late import LateLibrary
+
+pp, sc = LateLibrary("pandapower"), LateLibrary("pandapower.shortcircuit")
 
 RING = """\
 name = "ring"

@@ -5,9 +5,7 @@ import warnings
 from dataclasses import replace
 
 import numpy as np
-import pandapower as pp
 import pytest
-from pandapower import networks
 from scipy.io import savemat
 
 from fmus.grid.element_data import Zip
@@ -16,6 +14,9 @@ from orchestrator.cases.flow.power_flow import FlowUnit, solve_power_flow
 from orchestrator.cases.form.schema import NetworkTable
 from orchestrator.cases.networks.data import network_data
 from orchestrator.core.errors import InputError
+from tests.support.late import LateLibrary
+
+pp, networks = LateLibrary("pandapower"), LateLibrary("pandapower.networks")
 
 SMALL = """\
 function mpc = small

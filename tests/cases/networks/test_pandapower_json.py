@@ -4,16 +4,17 @@ import json
 import warnings
 from functools import cache
 
-import pandapower as pp
 import pandas as pd
 import pytest
-from pandapower import networks
-from pandapower.control.basic_controller import Controller
-from pandapower.control.util.characteristic import SplineCharacteristic
 
 from orchestrator.cases.networks.pandapower_json import network_text
 from orchestrator.cases.networks.sources import read_pandapower
 from orchestrator.core.errors import InputError
+from tests.support.late import LateLibrary
+
+pp, networks = LateLibrary("pandapower"), LateLibrary("pandapower.networks")
+control = LateLibrary("pandapower.control")
+characteristic = LateLibrary("pandapower.control.util.characteristic")
 
 
 @cache
@@ -101,7 +102,7 @@ def test_deep_brackets_are_one_error(tmp_path):
 
 
 def with_a_characteristic(net):
-    SplineCharacteristic(net, [0, 1, 2], [1.0, 2.0, 3.0])
+    characteristic.SplineCharacteristic(net, [0, 1, 2], [1.0, 2.0, 3.0])
 
 
 def test_every_figure_of_a_network_stays(tmp_path):
@@ -119,7 +120,7 @@ def test_every_figure_of_a_network_stays(tmp_path):
 
 
 def test_a_controller_which_no_power_flow_reads_is_left_out(tmp_path):
-    path = saved(tmp_path, Controller)
+    path = saved(tmp_path, control.basic_controller.Controller)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         net = pp.from_json_string(read(path), convert=True)

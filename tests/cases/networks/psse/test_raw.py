@@ -5,9 +5,7 @@ import json
 import warnings
 
 import numpy as np
-import pandapower as pp
 import pytest
-from pandapower import networks
 
 from orchestrator.cases.form.schema import NetworkTable
 from orchestrator.cases.networks.data import network_data
@@ -15,6 +13,9 @@ from orchestrator.cases.networks.psse.raw import read_raw
 from orchestrator.core.errors import InputError
 from tests.cases.networks.psse import BUSES, LINES, LOADS, MACHINES, TRANSFORMERS, raw, records
 from tests.cases.networks.test_network_sources import solved
+from tests.support.late import LateLibrary
+
+pp, networks = LateLibrary("pandapower"), LateLibrary("pandapower.networks")
 
 
 @pytest.fixture
