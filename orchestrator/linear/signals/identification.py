@@ -13,6 +13,7 @@ from orchestrator.core.errors import AnalysisError
 from orchestrator.linear.spectra.modes import OfEigenvalue
 
 TOLERANCE = 1e-6  # singular values below this fraction of the largest are taken for noise
+MOST_EXPONENTIALS = 24  # more of them are noise, in any signal of a grid
 _MIN_SAMPLES = 20  # fewer hold no swing with its damping
 _LEAST_MULTIPLIER = 1e-6  # of a mode from sample to sample; a smaller one is gone within one sample
 _MAX_SAMPLES = 1200  # more are thinned out: the singular values of their Hankel matrix take seconds
@@ -40,13 +41,15 @@ def identify_modes(
     signal: NDArray[np.float64],
     *,
     tolerance: float = TOLERANCE,
-    max_order: int = 24,
+    order: int | None = None,
+    max_order: int = MOST_EXPONENTIALS,
     highest_hz: float = 10.0,
 ) -> list[IdentifiedMode]:
     """Write a signal as a sum of damped exponentials.
 
     ``times`` and ``signal``: shape (n,); equally spaced samples of a free response, [s] and any unit.
     ``tolerance``: singular values below this fraction of the largest are taken for noise.
+    ``order``: number of exponentials, where it is not to be found from the tolerance.
     ``highest_hz``: the signal is thinned to ten samples per period of this frequency."""
     used = sampling(times, highest_hz)
     thin, interval = used.thin, used.interval
@@ -66,8 +69,8 @@ def identify_modes(
     size = np.abs(np.diagonal(triangle))
     kept = triangle[: max(1, np.count_nonzero(size > _DROPPED * tolerance * size[0]))]
     _, singular, right = np.linalg.svd(kept[:, np.argsort(columns)], full_matrices=False)
-    order = min(int((singular > tolerance * singular[0]).sum()), max_order)
-    basis = right[:order].T
+    seen = int((singular > tolerance * singular[0]).sum())
+    basis = right[: min(seen if order is None else order, max_order)].T
     multipliers = np.linalg.eigvals(np.linalg.pinv(basis[:-1]) @ basis[1:])
     if len(y) * np.log(np.abs(multipliers).max(initial=1.0)) > _LARGEST_EXPONENT:
         raise AnalysisError(

@@ -86,17 +86,20 @@ def _spaced(expression: str, known: Sequence[str]) -> str:
 
 
 def strongest_modes(
-    curve: xr.DataArray, start: float, stop: float | None = None
+    curve: xr.DataArray, start: float, stop: float | None = None, *, order: int | None = None
 ) -> list[IdentifiedMode]:
     """Return what a signal rings with between two times [s], strongest first; see `identify_modes`.
+
+    ``order``: of a measured signal's model, where it is not to be found from its noise; see `order_of`.
 
     What has less than a thousandth of the strongest's amplitude is left out, whatever the trend that an oscillation is
     on. Each mode has its doubts."""
     window = curve.sel(time=slice(start, stop))
-    found = _modes_of(window)
+    found = _modes_of(window, order=order)
     begin, end = float(window["time"][0]), float(window["time"][-1])
     try:
-        others = _modes_of(window.sel(time=slice(begin + SHORTER * (end - begin), None)), COARSER)
+        later = window.sel(time=slice(begin + SHORTER * (end - begin), None))
+        others = _modes_of(later, COARSER)
     except AnalysisError:
         others = None
     middle = (begin + end) / 2
@@ -114,10 +117,12 @@ def _part(window: xr.DataArray) -> WindowPart:
     return part_of(window["time"].values, window.values, modes)
 
 
-def _modes_of(window: xr.DataArray, coarser: float = 1.0) -> list[IdentifiedMode]:
+def _modes_of(
+    window: xr.DataArray, coarser: float = 1.0, order: int | None = None
+) -> list[IdentifiedMode]:
     """Modes of a part of a signal; ``coarser`` is a factor of what is taken for noise."""
     if is_measured(window):
-        return measured_modes(window, coarser)
+        return measured_modes(window, coarser, order)
     # Oscillations are small beside the value that they are around, and would count as noise beside it.
     deviation = window.values - float(window.mean())
     return identify_modes(window["time"].values, deviation, tolerance=coarser * TOLERANCE)

@@ -28,34 +28,45 @@ _WAVEFORM = 0.5
 _NEAR = 0.15  # part of the line's frequency within which power is counted as near it
 # singular values below this part of the largest are noise: the resolution of 16 bits
 _LEAST_NOISE = 1e-5
+_FEWEST = 6  # samples whose Hankel matrix has a median worth the name
 
 
 def is_measured(curve: xr.DataArray) -> bool:
     return LINE_FREQUENCY in curve.coords
 
 
-def measured_modes(window: xr.DataArray, coarser: float = 1.0) -> list[IdentifiedMode]:
+def measured_modes(
+    window: xr.DataArray, coarser: float = 1.0, order: int | None = None
+) -> list[IdentifiedMode]:
+    """Modes of a measured signal; ``order``: of the model, found from the signal's noise where it is not given."""
     times, values = window["time"].values, np.asarray(window.values, dtype=float)
     _check(times, values, float(window.coords[LINE_FREQUENCY]))
+    tolerance = coarser * _singular_values(window)[1]
+    return identify_modes(times, values - float(values.mean()), tolerance=tolerance, order=order)
+
+
+def order_of(window: xr.DataArray) -> int:
+    """Number of exponentials that a measured signal holds beside its noise."""
+    singular, noise = _singular_values(window)
+    return int((singular > noise * singular[0]).sum())
+
+
+def _singular_values(window: xr.DataArray) -> tuple[Numbers, float]:
+    """Singular values of a signal's Hankel matrix, and below which part of the largest they are noise.
+
+    Those are below 2.2 times the median, for a matrix with half as many columns as rows: Gavish and Donoho, "The
+    optimal hard threshold for singular values is 4/sqrt(3)", IEEE Trans. Information Theory 60(8), 2014, equation 5."""
+    times, values = window["time"].values, np.asarray(window.values, dtype=float)
     deviation = values - float(values.mean())
     thin = sampling(times).thin
-    seen = np.convolve(deviation, averaging(deviation, thin), mode="valid")[::thin]
-    return identify_modes(times, deviation, tolerance=coarser * _noise(seen))
-
-
-def _noise(values: Numbers) -> float:
-    """Singular values of the signal's Hankel matrix that are noise, as a part of the largest: those below 2.2 times the
-    median, for a matrix with half as many columns as rows.
-
-    Gavish and Donoho, "The optimal hard threshold for singular values is 4/sqrt(3)", IEEE Trans. Information Theory
-    60(8), 2014, equation 5."""
-    if len(values) < 6:
-        return _LEAST_NOISE
-    hankel = np.lib.stride_tricks.sliding_window_view(values, len(values) // 3 + 1)
+    used = np.convolve(deviation, averaging(deviation, thin), mode="valid")[::thin]
+    if len(used) < _FEWEST:
+        return np.ones(1), _LEAST_NOISE
+    hankel = np.lib.stride_tricks.sliding_window_view(used, len(used) // 3 + 1)
     singular = np.linalg.svd(hankel, compute_uv=False)
     beta = hankel.shape[1] / hankel.shape[0]
     factor = 0.56 * beta**3 - 0.95 * beta**2 + 1.82 * beta + 1.43
-    return max(_LEAST_NOISE, float(factor * np.median(singular) / (singular[0] or 1.0)))
+    return singular, max(_LEAST_NOISE, float(factor * np.median(singular) / (singular[0] or 1.0)))
 
 
 def _check(times: Numbers, values: Numbers, line_frequency: float) -> None:

@@ -16,6 +16,7 @@ from orchestrator.core.late import xr
 from orchestrator.linear.signals.identification import IdentifiedMode
 from orchestrator.output.results.readers import LINE_FREQUENCY
 from orchestrator.studies.signals.comparison import strongest_modes
+from orchestrator.studies.signals.measured import order_of
 from orchestrator.studies.validation.record import Recording
 from orchestrator.studies.validation.windows import Windows
 
@@ -30,10 +31,10 @@ _SETTLED = 0.05  # part of a step within which it has settled
 _FEW = 20  # samples of a ring-down
 _MOST_SAMPLES = 150  # of which modes are looked for; more take seconds and say little more
 _SLOWEST_PERIODS = 1.5  # periods of a mode that a window has to hold
-_LATER = (
-    0.03,
-    0.06,
-)  # parts of a ring-down that are left out at its begin, to see what that changes
+_OTHER_LOOKS = ((0.03, 0), (0.06, 0), (0.0, -2), (0.0, 2))
+"""Other looks at a ring-down, to see what they change: the part left out at its begin, and how many exponentials more
+the model has, as an oscillation takes two."""
+_LAST = 0.03  # part of a ring-down at its end that is left out, where the filter of a recorder ends
 _SAME_MODE = 0.3  # part of the frequency by which two modes may differ and be the same
 
 
@@ -249,16 +250,25 @@ def step_of(recording: Recording, values: Numbers, windows: Windows) -> StepFigu
 
 
 def ring_downs(
-    recording: Recording, measured: Numbers, simulated: Numbers, windows: Windows
+    recording: Recording,
+    measured: Numbers,
+    simulated: Numbers,
+    windows: Windows,
+    more: int = 0,
 ) -> tuple[IdentifiedMode | None, IdentifiedMode | None]:
-    """The mode with which the measured signal rings the most after the event, and the simulated one's same mode."""
-    modes = _modes(recording, measured, windows)
-    if not modes:
+    """The mode with which the measured signal rings the most after the event, and the simulated one's same mode.
+
+    Both have the measured one's order: at an order of its own, each would have other modes. ``more``: how many
+    exponentials are added to it."""
+    curves = [_ringing(recording, values, windows) for values in (measured, simulated)]
+    order = 0 if curves[0] is None else max(2, order_of(curves[0]) + more)
+    found = [_modes(recording, one, windows, order) for one in curves]
+    if not found[0]:
         return None, None
-    strongest = modes[0]
+    strongest = found[0][0]
     others = [
         one
-        for one in _modes(recording, simulated, windows)
+        for one in found[1]
         if abs(one.frequency_hz - strongest.frequency_hz) < _SAME_MODE * strongest.frequency_hz
     ]
     same = min(others, key=lambda one: abs(one.eigenvalue - strongest.eigenvalue), default=None)
@@ -282,34 +292,46 @@ def _doubt_of_modes(
     windows: Windows,
     found: tuple[IdentifiedMode | None, IdentifiedMode | None],
 ) -> tuple[float, float]:
-    """How far the difference of two modes moves if the ring-down is looked at from a little later on."""
+    """How far the difference of two modes moves by other looks at the ring-down.
+
+    A look that does not show both modes leaves in doubt whether they differ at all."""
     here = modes_apart(found)
     if here is None:
         return 0.0, 0.0
     rest = recording.length - windows.end
-    others = []
-    for part in _LATER:
+    seen = [here]
+    for part, more in _OTHER_LOOKS:
         later = replace(windows, end=windows.end + part * rest)
-        there = modes_apart(ring_downs(recording, *signals, later))
-        others += [] if there is None else [there]
-    seen = np.array([here, *others])
-    frequency, damping = 0.5 * np.ptp(seen, axis=0)
+        there = modes_apart(ring_downs(recording, *signals, later, more))
+        seen.append((-here[0], -here[1]) if there is None else there)
+    frequency, damping = 0.5 * np.ptp(np.array(seen), axis=0)
     return float(frequency), float(damping)
 
 
-def _modes(recording: Recording, values: Numbers, windows: Windows) -> list[IdentifiedMode]:
-    part = recording.times > windows.end
+def _ringing(recording: Recording, values: Numbers, windows: Windows) -> xr.DataArray | None:
+    """The part of a signal after the event, thinned; None where it is short or hardly moves."""
+    end = recording.times[-1] - _LAST * (recording.times[-1] - windows.end)
+    part = (recording.times > windows.end) & (recording.times < end)
     if part.sum() < _FEW or np.ptp(values[part]) < _LEAST_MOVES:
-        return []
+        return None
     thin = max(1, round(part.sum() / _MOST_SAMPLES))
     times, thinned = (_thinned(x[part], thin) for x in (recording.times, values))
-    curve = xr.DataArray(thinned, {"time": times, LINE_FREQUENCY: 0.0}, ("time",))
+    return xr.DataArray(thinned, {"time": times, LINE_FREQUENCY: 0.0}, ("time",))
+
+
+def _modes(
+    recording: Recording, curve: xr.DataArray | None, windows: Windows, order: int
+) -> list[IdentifiedMode]:
+    """The modes of a ring-down that its length and its samples can show."""
+    if curve is None:
+        return []
+    times = curve["time"].values
     try:
-        found = strongest_modes(curve, float(times[0]))
+        found = strongest_modes(curve, float(times[0]), order=order)
     except CosimError:
         return []
     slowest = _SLOWEST_PERIODS / (recording.length - windows.end)
-    fastest = 0.25 / (thin * recording.interval)
+    fastest = 0.25 / float(np.median(np.diff(times)))
     return [one for one in found if slowest < one.frequency_hz < fastest]
 
 

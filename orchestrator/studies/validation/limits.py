@@ -62,6 +62,7 @@ class OpenCause(StrEnum):
     SAMPLES = "samples"
     STEP = "step"
     FIXED_STEP = "fixed step"
+    RING_DOWN = "ring-down"
     NO_FIGURE = "no figure"
 
 
@@ -125,7 +126,7 @@ def judge_limits(limits: LimitTables, comparison: EventComparison) -> list[Crite
         *_of_delay(limits, comparison),
         *_of_ring_down(limits, comparison),
     ]
-    return [replace(one, why_open=_why_open(one, comparison)) for one in found]
+    return [replace(one, why_open=one.why_open or _why_open(one, comparison)) for one in found]
 
 
 def _why_open(one: Criterion, comparison: EventComparison) -> OpenCause | None:
@@ -221,4 +222,14 @@ def _of_ring_down(limits: LimitTables, comparison: EventComparison) -> Iterator[
             if value is not None:
                 verdict = _verdict(value, noise, most, grows=False)
             place = f"ring-down {signal} {name}"
-            yield Criterion(label, place, unit, value, most, noise=noise, verdict=verdict)
+            unclear = value is not None and verdict is LimitVerdict.OPEN
+            yield Criterion(
+                label,
+                place,
+                unit,
+                value,
+                most,
+                noise=noise,
+                verdict=verdict,
+                why_open=OpenCause.RING_DOWN if unclear else None,
+            )

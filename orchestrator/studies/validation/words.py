@@ -524,6 +524,7 @@ _WHY_OPEN = {
     OpenCause.STEP: "the device sees a jump of the voltage only at the begin of its step",
     OpenCause.FIXED_STEP: "the device sees a jump of the voltage only at the begin of its step, and refuses a "
     "shorter one",
+    OpenCause.RING_DOWN: "seen from a little later on, or by a model of another order, the ring-down has another mode",
     OpenCause.NO_FIGURE: "the recording shows none",
 }
 

@@ -1,0 +1,90 @@
+"""Modes of a measured and a simulated ring-down beside each other: what is the model's, and what is the look's."""
+
+import numpy as np
+import pytest
+
+from orchestrator.studies.validation.figures import compare_signals, modes_apart
+from orchestrator.studies.validation.limits import LimitVerdict, _verdict
+from orchestrator.studies.validation.record import Recording
+from orchestrator.studies.validation.windows import Windows
+
+INTERVAL = 0.02  # of a recorder that sends 50 samples a second [s]
+LENGTH = 8.0  # [s]
+EVENT = Windows(begin=1.0, end=1.1, length=LENGTH)
+TIMES = INTERVAL * np.arange(round(LENGTH / INTERVAL) + 1)
+LIMIT = 3.0  # of the example's limits on damping [points of percent]
+
+
+def rings(*modes):
+    """A sum of damped swings from the event on; each with frequency [Hz], damping [1] and amplitude [pu]."""
+    since = np.maximum(TIMES - EVENT.begin, 0.0)
+    found = np.zeros(len(TIMES))
+    for frequency, damping, amplitude in modes:
+        decay = 2 * np.pi * frequency * damping / np.sqrt(1 - damping**2)
+        found += amplitude * np.exp(-decay * since) * np.sin(2 * np.pi * frequency * since)
+    return 0.9 + found + 0j
+
+
+def apart(measured, simulated):
+    """Frequency [%] and damping [points] by which the two are apart, and the doubts of both."""
+    everywhere = np.ones(len(TIMES), dtype=bool)
+    recording = Recording(
+        label="rec",
+        begin=0.0,
+        interval=INTERVAL,
+        voltage=np.ones(len(TIMES), dtype=complex),
+        power=measured,
+        good=everywhere,
+        driven=everywhere,
+        frame_hz=50.0,
+        instantaneous=False,
+        average=INTERVAL,
+        channels={},
+    )
+    figures = compare_signals(recording, simulated, EVENT)["p"]
+    return modes_apart(figures.modes), figures.modes_doubt
+
+
+def scattering(values, size, seed):
+    return values + size * np.random.default_rng(seed).standard_normal(len(values))
+
+
+BOTH = ((0.76, 0.23, 0.04), (0.31, 0.31, 0.04))
+"""Two well damped swings beside each other, as a converter's power shows them."""
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_right_model_rings_as_the_plant_does_whatever_its_noise(seed):
+    """The simulated signal has less noise, and would have another order by itself."""
+    plant, model = scattering(rings(*BOTH), 4e-4, seed), scattering(rings(*BOTH), 1e-4, 100 + seed)
+    (frequency, damping), _ = apart(plant, model)
+    assert abs(frequency) < 2
+    assert abs(damping) < LIMIT
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_in_large_noise_no_ring_down_is_called_wrong(seed):
+    found, doubts = apart(
+        scattering(rings(*BOTH), 2e-2, seed), scattering(rings(*BOTH), 5e-3, 50 + seed)
+    )
+    if found is not None:
+        verdict = _verdict(abs(found[1]), doubts[1], LIMIT, grows=False)
+        assert verdict is not LimitVerdict.NOT_MET
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_model_with_less_damping_is_called_wrong(seed):
+    plant = scattering(rings((0.76, 0.15, 0.04)), 2e-4, seed)
+    found, doubts = apart(plant, scattering(rings((0.76, 0.08, 0.04)), 1e-4, 50 + seed))
+    assert found[1] == pytest.approx(-7, abs=0.5)
+    assert _verdict(abs(found[1]), doubts[1], LIMIT, grows=False) is LimitVerdict.NOT_MET
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_sample_that_is_off_at_the_end_changes_nothing(seed):
+    """A recorder's filter holds less there."""
+    plant, model = scattering(rings(*BOTH), 4e-4, seed), scattering(rings(*BOTH), 1e-4, 100 + seed)
+    model[-2:] -= 0.01
+    (frequency, damping), _ = apart(plant, model)
+    assert abs(frequency) < 2
+    assert abs(damping) < LIMIT
