@@ -63,7 +63,7 @@ def _singular_values(window: xr.DataArray) -> tuple[Numbers, float]:
     if len(used) < _FEWEST:
         return np.ones(1), _LEAST_NOISE
     hankel = np.lib.stride_tricks.sliding_window_view(used, len(used) // 3 + 1)
-    singular = np.linalg.svd(hankel, compute_uv=False)
+    singular = np.asarray(np.linalg.svd(hankel, compute_uv=False), dtype=float)
     beta = hankel.shape[1] / hankel.shape[0]
     factor = 0.56 * beta**3 - 0.95 * beta**2 + 1.82 * beta + 1.43
     return singular, max(_LEAST_NOISE, float(factor * np.median(singular) / (singular[0] or 1.0)))
