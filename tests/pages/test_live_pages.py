@@ -143,6 +143,34 @@ def test_a_question_names_the_few_values_at_which_it_is_stable():
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
+def test_a_typed_value_that_was_not_computed_is_told_with_the_one_that_is_shown():
+    """400 once became 447.2, and −5 the least of the grid, without a word."""
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as tools:
+        browser = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        view = browser.new_page(viewport={"width": 1280, "height": 900})
+        view.goto((ROOT / ".docs" / "live" / "two_area.html").as_uri())
+        control = view.locator('.control[data-name="gfor.pod_p.K"]')
+        said = {}
+        for typed in ("31", "2000", "−5", "27"):
+            control.get_by_role("textbox").fill(typed)
+            control.get_by_role("textbox").press("Enter")
+            view.wait_for_timeout(100)
+            told = control.locator(".snapped")
+            said[typed] = (
+                told.inner_text() if told.count() else "",
+                control.get_by_role("textbox").input_value(),
+            )
+        browser.close()
+    assert said == {
+        "31": ("nearest computed: 27 (31 was asked)", "27"),
+        "2000": ("nearest computed: 400 (2000 was asked)", "400"),
+        "−5": ("nearest computed: 0 (−5 was asked)", "0"),
+        "27": ("", "27"),
+    }
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
 def test_no_page_is_wider_than_the_smallest_telephone():
     """A path in a heading, and the buttons beside the tabs, once were."""
     playwright = pytest.importorskip("playwright.sync_api")

@@ -23,6 +23,7 @@ function savedAnswer(question) {
 // While a slider is dragged: the nearest computed state, and over it what lies between.
 async function dragSaved(name, value) {
   const begin = performance.now(), others = SAVED.movers ? [] : Object.keys(SAVED.grid).filter(one => one !== name);
+  document.querySelectorAll(".snapped").forEach(one => one.remove());  // it told of the last release
   const wanted = { [name]: value, ...Object.fromEntries(others.map(one => [one, state.values[one] ?? ownOf(one)])) };
   Object.assign(seen, { moved: name, dragged: value });
   const near = JSON.stringify([name, heldNear(name, value), others.map(one => wanted[one])]);
@@ -65,11 +66,12 @@ async function setSaved(name, value) {
   const near = typeof value === "number" && name in SAVED.grid ? heldNear(name, value) : null;
   if (near !== null) { seen.moved = name; if (near === ownOf(name)) delete state.values[name]; else state.values[name] = near; }
   Object.assign(seen, { estimate: null, near: null });
-  await compute();
+  const shown = await compute();
   keepState();
   paintControls();
   const error = document.querySelector(`.control[data-name="${CSS.escape(name)}"] .error`);
   if (error && near === null) error.textContent = "give a number";
+  else if (error && shown && number(near) !== number(value)) error.before(make("span", { class: "snapped", role: "status" }, `nearest computed: ${number(near)} (${number(value)} was asked)`));
 }
 // How far what is drawn between computed values may be off: at values halfway, which were computed to know it.
 function wordsOfError() {
