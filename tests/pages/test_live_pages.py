@@ -171,6 +171,26 @@ def test_a_typed_value_that_was_not_computed_is_told_with_the_one_that_is_shown(
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
+@pytest.mark.parametrize(
+    ("name", "keys"), [("design", ".legend i"), ("source", ".legend i"), ("two_area", "svg")]
+)
+def test_keys_of_a_legend_keep_their_colours_on_paper(name, keys):
+    """Browsers leave out the backgrounds that they print, and with them a key's only colour."""
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as tools:
+        browser = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        view = browser.new_page()
+        view.emulate_media(media="print")
+        view.goto((ROOT / ".docs" / "live" / f"{name}.html").as_uri())
+        printed = view.evaluate(
+            "keys => [...document.querySelectorAll(keys)].map(x => getComputedStyle(x).printColorAdjust)",
+            keys,
+        )
+        browser.close()
+    assert {*printed} == {"exact"}
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
 def test_no_page_is_wider_than_the_smallest_telephone():
     """A path in a heading, and the buttons beside the tabs, once were."""
     playwright = pytest.importorskip("playwright.sync_api")
