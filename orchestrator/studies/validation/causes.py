@@ -16,7 +16,10 @@ _LEAST_LEFT = 0.001  # what samples and steps make of a right model [pu of the r
 _HARDLY_APART = (
     1.3  # times the error that the best cause leaves, up to which another one is hardly told apart
 )
-_EXPLAINS = 0.75  # part of the squared error beyond the scatter that an explanation takes away
+EXPLAINS = 0.75  # part of the squared error beyond the scatter that an explanation takes away
+_AS_GOOD = 1.05
+"""Times the least error left, up to which a position leads: a number has one freedom more, which wins it a little."""
+
 _MOST_DELAY = 0.25  # longest delay that is looked for [s]
 _DELAYS = 100  # that are tried at first
 _BETWEEN = 5  # between two of these, around the best one
@@ -67,12 +70,19 @@ class Explanation:
     @property
     def explains(self) -> bool:
         """Return whether most of the error goes away with it, and no other cause leaves clearly less."""
-        return self.share >= _EXPLAINS and not self.outdone
+        return self.share >= EXPLAINS and not self.outdone
 
     @property
     def leaves_much(self) -> bool:
         """Return whether what is left stands far above the scatter: something else is off as well."""
         return leaves_much(self.left, self.noise)
+
+    @property
+    def values(self) -> dict[str, float | bool]:
+        """Values with which a device has this cause; empty for a delay, and for a limit that no parameter has."""
+        if self.cause in (CauseKind.DELAY, CauseKind.LIMIT):
+            return {}
+        return {self.name: self.value, **self.beside}
 
     def same_as(self, other: Explanation) -> bool:
         """Return whether another cause, found on another way, is of the same parameters.
@@ -116,6 +126,11 @@ class CauseSearch:
         """Return whether the first of them takes most of the error away."""
         return bool(self.causes) and self.causes[0].explains
 
+    @property
+    def runs_explained(self) -> bool:
+        """Return whether a device can be run with the first cause, and so explains most of the error."""
+        return self.explains and not self.held and bool(self.causes[0].values)
+
 
 def leaves_much(left: float, noise: float) -> bool:
     """Return whether an error stands far above what the recordings scatter [pu of the rating]."""
@@ -126,12 +141,22 @@ def without_worse_ways(causes: Sequence[Explanation]) -> list[Explanation]:
     """Each cause once, of those that leave the least first; one that leaves clearly more than the first is outdone.
 
     Where the first leaves the recordings' scatter, what leaves more is off; where it does not, as well: the data
-    speak for the first."""
+    speak for the first. A position that leaves as little goes before it: `pod_p.enabled = false`, and not a gain of
+    nearly nothing."""
     found: list[Explanation] = []
-    for one in causes:
+    for one in _simplest_first(causes):
         if not any(one.same_as(other) for other in found):
             found.append(replace(one, outdone=bool(found) and not one.is_beside(found[0])))
     return found
+
+
+def _simplest_first(causes: Sequence[Explanation]) -> list[Explanation]:
+    """The causes, and first of them the position alone that leaves as little as the best does, where there is one."""
+    for one in causes:
+        alone = one.cause is CauseKind.POSITION and not one.beside
+        if alone and one.left <= _AS_GOOD * causes[0].left:
+            return [one, *(other for other in causes if other is not one)]
+    return list(causes)
 
 
 def later(

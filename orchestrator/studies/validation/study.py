@@ -14,7 +14,7 @@ from orchestrator.core.options import Option
 from orchestrator.core.threads import one_thread
 from orchestrator.studies.validation.beside import WindowApart, models_apart
 from orchestrator.studies.validation.between_samples import with_doubt_between
-from orchestrator.studies.validation.causes import CauseSearch, Explanation
+from orchestrator.studies.validation.causes import EXPLAINS, CauseSearch, Explanation
 from orchestrator.studies.validation.device import PlayedDevice, StartRefusedError
 from orchestrator.studies.validation.event import (
     EventComparison,
@@ -36,6 +36,7 @@ from orchestrator.studies.validation.limits import (
     verdict_of,
 )
 from orchestrator.studies.validation.parameters import Wanted, wanted_parameters
+from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.record import PortBases, read_recording
 from orchestrator.studies.validation.trials import RefusedTrial
 from orchestrator.studies.validation.windows import given_windows
@@ -181,6 +182,8 @@ def _validate(request: ValidationRequest, report: Report) -> ValidationResult:
     result = add_verdict(ValidationResult(request, comparisons, others=others))
     if request.explain:
         search = _search_causes(request.device, result.comparisons, report)
+        answered = _without_explained(request.device, result.comparisons, search)
+        result = add_verdict(replace(result, comparisons=answered))
         result = replace(
             result,
             explanations=search.causes,
@@ -207,6 +210,39 @@ def _search_causes(
     other = explain_errors(device, whole, report, [one.event for one in kept])
     taken = other if other.explains and not other.causes[0].leaves_much else found
     return replace(taken, finished=other.finished)
+
+
+def _without_explained(
+    device: PlayedDevice, comparisons: Sequence[EventComparison], search: CauseSearch
+) -> list[EventComparison]:
+    """The comparisons without questions about a setpoint that the first cause answers; those that stand are tried.
+
+    A cause answers one if the device with its values explains the whole event, and makes no such question itself. A
+    delay, and a limit that no parameter has, are not run, and leave the question."""
+    if not search.finished:
+        return list(comparisons)
+    other = device.with_values(search.causes[0].values) if search.runs_explained else None
+    found = []
+    for one in comparisons:
+        asked = list(one.questions)
+        for question in filter(_is_of_setpoint, one.questions):
+            asked.remove(question)
+            if other is None or not _answers(other, one):
+                asked.append(replace(question, figures={**question.figures, "tried": True}))
+        found.append(replace(one, questions=tuple(asked)))
+    return found
+
+
+def _is_of_setpoint(question: Question) -> bool:
+    return question.kind is QuestionKind.SETPOINT
+
+
+def _answers(other: PlayedDevice, comparison: EventComparison) -> bool:
+    """Return whether a device with other values explains a whole event, and makes no question about a setpoint."""
+    anew = compare_with(other, comparison.event)
+    errors = [math.hypot(*rms_error(one.played.power, one.event)) for one in (comparison, anew)]
+    explained = errors[1] ** 2 <= (1 - EXPLAINS) * errors[0] ** 2
+    return explained and not any(map(_is_of_setpoint, anew.questions))
 
 
 def _with_fit(result: ValidationResult, report: Report) -> ValidationResult:

@@ -321,25 +321,31 @@ def _setpoint(x: Figures) -> str:
         return (
             f"from {x['at']:.4g} to {x['until']:.4g} s {name} leaves the model's along a straight line, by "
             f"{x['offset']:+.3g} pu, while the angle of the voltage drifts: did a setpoint ramp, or did a control "
-            "beyond the plant (AGC) move it? No droop or gain explains it. " + _before_setpoint(x)
+            "beyond the plant (AGC) move it? " + _before_setpoint(x)
         )
     if "until" in x:
         return (
             f"from {x['at']:.4g} to {x['until']:.4g} s {name} leaves the model's along a straight line, by "
-            f"{x['offset']:+.3g} pu, which the voltage does not explain: did a setpoint ramp? No parameter explains "
-            "it. " + _before_setpoint(x)
+            f"{x['offset']:+.3g} pu, which the voltage does not explain: did a setpoint ramp? "
+            + _before_setpoint(x)
         )
     return (
         f"at {x['at']:.4g} s {name} leaves the model's by {x['offset']:+.3g} pu and stays, and the "
-        "voltage does nothing then: did a setpoint change? No parameter explains it. "
-        + _before_setpoint(x)
+        "voltage does nothing then: did a setpoint change? " + _before_setpoint(x)
     )
 
 
 def _before_setpoint(x: Figures) -> str:
     """The remedy: causes are looked for before a setpoint changed, and a fit is given that part."""
     given = Option.STOP + f" {x['stop']:.4g}"
-    return Option.EXPLAIN + f" looks at the part before; give it to the rest as well, with {given}"
+    if x.get("tried"):
+        return (
+            f"No cause that was tried explains it. Give the part before to the rest, with {given}"
+        )
+    return (
+        f"Type {Option.EXPLAIN}: it tries what else explains it. If it was a setpoint, give the part before, with "
+        f"{given}"
+    )
 
 
 def _out_of_step(x: Figures) -> str:

@@ -199,6 +199,42 @@ def test_no_cause_is_read_from_what_follows_a_setpoint_that_changed():
     assert 2.2 < question["figures"]["stop"] < 2.5
     assert all(one.error < 0.01 for one in found.result.explanations)  # 0.03 with what follows
     assert "pod_p.T_W" not in [one.name for one in found.result.explanations if one.explains]
+    (said,) = (one for one in found.questions if "did a setpoint change?" in one)
+    assert "No cause that was tried explains it" in said
+    assert "--explain" not in said
+
+
+@pytest.mark.slow
+def test_a_pod_that_is_off_in_the_plant_is_named_as_a_switch_and_no_setpoint_is_asked_about():
+    """From 50 samples a second a model with the POD on leaves for good, as if a setpoint had changed."""
+    slow = with_noise(table(run("pod_p", stop=4.0, gfor__pod_p__enabled=False))).iloc[::20]
+    asked, found = (
+        gfor_in_python.validate(
+            "gfor_phasor", slow.set_index("time"), values=ON, step="1 ms", explain=explain
+        )
+        for explain in (False, True)
+    )
+    (said,) = (one for one in asked.questions if "did a setpoint change?" in one)
+    assert "Type --explain" in said
+    assert "parameter" not in said
+    assert not any("setpoint" in one for one in found.questions)
+    best = found.result.explanations[0]
+    assert (best.name, best.value, best.beside) == ("pod_p.enabled", False, {})
+
+
+def test_a_switch_leads_before_a_gain_of_nearly_nothing_that_leaves_as_little():
+    gain = Explanation(CauseKind.VALUE, "pod_p.K", "pu", 200.0, 0.2, 0.03, 0.0007218, noise=5e-5)
+    switch = replace(
+        gain, cause=CauseKind.POSITION, name="pod_p.enabled", now=True, value=False, left=0.0007229
+    )
+    assert [one.name for one in without_worse_ways([gain, switch])] == [
+        "pod_p.enabled",
+        "pod_p.K",
+    ]
+    worse = replace(switch, left=0.0008)
+    assert without_worse_ways([gain, worse])[0].name == "pod_p.K"
+    other = replace(switch, beside={"pod_p.limit": 0.1})  # it has a freedom as well
+    assert without_worse_ways([gain, other])[0].name == "pod_p.K"
 
 
 def test_a_cause_beside_another_is_not_said_to_be_all():
