@@ -3,6 +3,7 @@
 const held = JSON.parse(document.getElementById("held").textContent), at = id => document.getElementById(id);
 const COLOURS = ["#0072b2", "#d55e00"], SIDE = 460, first = held.judged[0].ratio, last = held.judged.at(-1).ratio;
 let reach = 3;
+const within = (x, low, high) => Math.min(high, Math.max(low, x));
 const figure = (x, digits = 3) => String(+x.toPrecision(digits)).replace("-", "−");
 function draw(name, attributes, text) {
   const element = document.createElementNS("http://www.w3.org/2000/svg", name);
@@ -37,7 +38,7 @@ function paint() {
   const x = v => SIDE / 2 + v / reach * SIDE / 2, y = v => SIDE / 2 - v / reach * SIDE / 2, parts = [];
   for (let k = -Math.floor(reach); k <= reach; k++) {
     parts.push(draw("path", { class: k ? "grid" : "axis", d: `M${x(k)} 0V${SIDE}M0 ${y(k)}H${SIDE}` }));
-    if (k && k % Math.ceil(reach / 4) === 0) parts.push(draw("text", { class: "faint", x: x(k) - 4, y: y(0) + 14 }, figure(k)), draw("text", { class: "faint", x: x(0) + 4, y: y(k) + 4 }, `${figure(k)}j`));
+    if (k && k % Math.ceil(reach / 4) === 0) parts.push(draw("text", { class: "faint", x: within(x(k) - 4, 2, SIDE - 16), y: y(0) + 20 }, figure(k)), draw("text", { class: "faint", x: x(0) + 4, y: within(y(k) + 4, 11, SIDE - 4) }, `${figure(k)}j`));
   }
   parts.push(draw("circle", { cx: x(0), cy: y(0), r: SIDE / 2 / reach, fill: "none", stroke: "#888" }), draw("circle", { cx: x(-1), cy: y(0), r: least * SIDE / 2 / reach, fill: "none", stroke: "#a11d1d", "stroke-dasharray": "5 4" }), draw("path", { d: `M${x(-1) - 6} ${y(0)}h12m-6 -6v12`, stroke: "#a11d1d", "stroke-width": 2 }));
   for (let k = 0; k < held.loci.length / 2; k++) for (const side of [1, -1]) {

@@ -10,6 +10,8 @@ if (SAVED?.others) {
   }
 }
 const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6d31", "#7f7f7f"];
+// A colour as it is seen well on the window's paper: paler in a dark one.
+const seenWell = colour => `color-mix(in srgb, ${colour} var(--pure), white)`;
 const SVG = "http://www.w3.org/2000/svg";
 
 // What the address holds; everything else follows from it.

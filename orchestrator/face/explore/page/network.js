@@ -131,7 +131,7 @@ function paintArrows(part) {
   const length = seen.info.diagram.buses.length <= 45 ? 95 : 60;
   group.replaceChildren(...(m?.shape ?? []).flatMap((s, k) => {
     const p = seen.unitPlaces?.[s.state.split(".")[0]], a = s.angle_deg * Math.PI / 180, r = length * s.magnitude / largest * part;
-    return p && Math.abs(r) > 1 ? [draw("path", { class: "arrow", stroke: COLOURS[k % COLOURS.length], d: arrow(p.x, p.y, p.x + r * Math.cos(a), p.y - r * Math.sin(a)) })] : [];
+    return p && Math.abs(r) > 1 ? [draw("path", { class: "arrow", stroke: seenWell(COLOURS[k % COLOURS.length]), d: arrow(p.x, p.y, p.x + r * Math.cos(a), p.y - r * Math.sin(a)) })] : [];
   }));
 }
 const isOn = name => (name ? (state.values[name] ?? parameterOf(name)?.value ?? true) !== false : true);

@@ -1,10 +1,11 @@
 "use strict";
 // The table of modes, and what is said of the one that is chosen.
 const order = { by: null, up: true };
+const GROWTH = "σ [1/s]";  // for which a telephone has no room
 const COLUMNS = [
   ["f [Hz]", m => m.frequency_hz, m => fixed(m.frequency_hz, 4)],
   ["Damping [%]", m => m.damping_percent, m => fixed(m.damping_percent, 2)],
-  ["σ [1/s]", m => m.real, m => fixed(m.real, 4)],
+  [GROWTH, m => m.real, m => fixed(m.real, 4)],
   ["Name", m => m.name ?? "", m => m.name ?? ""],
   ["Who", m => Object.keys(m.components)[0] ?? "", m => Object.entries(m.components).slice(0, 2).map(([c, x]) => `${c}\u00a0${fixed(100 * x, 0)}\u00a0%`).join(", ")],
 ];
@@ -34,15 +35,15 @@ function paintTable() {
   table.tHead.rows[0].replaceChildren(...columns.map(([name], k) => {
     const sort = make("button", { "aria-label": `sort by ${name}` }, `${name}${order.by === name ? (order.up ? " ▲" : " ▼") : ""}`);
     sort.addEventListener("click", () => { order.up = order.by === name ? !order.up : true; order.by = name; paintTable(); });
-    return make("th", { class: k >= columns.length - 2 ? "text" : null, scope: "col", "aria-sort": order.by === name ? (order.up ? "ascending" : "descending") : null }, sort);
+    return make("th", { class: k >= columns.length - 2 ? "text" : name === GROWTH ? "growth" : null, scope: "col", "aria-sort": order.by === name ? (order.up ? "ascending" : "descending") : null }, sort);
   }));
   const shown = seen.modes.map((m, k) => [m, k]);
   const by = columns.find(([name]) => name === order.by);
   if (by) shown.sort(([a, i], [b, j]) => { const x = by[1](a, i), y = by[1](b, j); return (x < y ? -1 : x > y ? 1 : 0) * (order.up ? 1 : -1); });
   table.tBodies[0].replaceChildren(...shown.map(([m, k]) => {
     const e = estimated?.modes[k];
-    const cells = columns.map(([name, , text], c) => make("td", { class: c >= columns.length - 2 ? "text" : null },
-      e && name === "f [Hz]" ? `≈ ${fixed(e.hz, 3)}` : e && name === "Damping [%]" ? `≈ ${fixed(e.damping, 1)}` : e && name === "σ [1/s]" ? `≈ ${fixed(e.real, 3)}` : text(m, k)));
+    const cells = columns.map(([name, , text], c) => make("td", { class: c >= columns.length - 2 ? "text" : name === GROWTH ? "growth" : null },
+      e && name === "f [Hz]" ? `≈ ${fixed(e.hz, 3)}` : e && name === "Damping [%]" ? `≈ ${fixed(e.damping, 1)}` : e && name === GROWTH ? `≈ ${fixed(e.real, 3)}` : text(m, k)));
     const row = make("tr", { "data-mode": k, tabindex: 0, class: `${k === chosenIndex() ? "chosen" : ""}${e ? " estimated" : ""}`, "aria-selected": k === chosenIndex() }, ...cells);
     row.addEventListener("click", () => choose(k));
     row.addEventListener("keydown", event => {
@@ -77,7 +78,7 @@ function paintChosen() {
   if (!m) { place.replaceChildren(make("p", { class: "soft" }, "Choose a mode in the map or the table: participation and shape.")); return; }
   const who = swingers(chosenIndex());
   const moving = make("input", { type: "checkbox", id: "moving" });
-  const shape = draw("svg", { class: "shape", viewBox: "-150 -105 300 210", role: "img", "aria-label": `Mode shape: ${m.shape.map(s => `${s.state} ${number(s.magnitude, 2)} at ${fixed(s.angle_deg, 0)}°`).join("; ")}` });
+  const shape = draw("svg", { class: "shape", viewBox: "-150 -115 300 230", role: "img", "aria-label": `Mode shape: ${m.shape.map(s => `${s.state} ${number(s.magnitude, 2)} at ${fixed(s.angle_deg, 0)}°`).join("; ")}` });
   const largest = Math.max(...m.shape.map(s => s.magnitude), 1e-12);
   const paint = turn => {
     const tips = [];
@@ -85,7 +86,7 @@ function paintChosen() {
       ...m.shape.filter(s => s.magnitude > 0.02 * largest).flatMap((s, k) => {
         const a = s.angle_deg * Math.PI / 180 + turn, r = 90 * s.magnitude / largest, x = r * Math.cos(a), y = -r * Math.sin(a);
         tips.push({ x, y, r: 5, first: [Math.cos(a), -Math.sin(a)], words: [s.state.split(".")[0]], size: r });
-        return [draw("path", { class: "arrow", stroke: COLOURS[k % COLOURS.length], d: arrow(0, 0, x, y) })];
+        return [draw("path", { class: "arrow", stroke: seenWell(COLOURS[k % COLOURS.length]), d: arrow(0, 0, x, y) })];
       }), ...placedTexts(tips.sort((a, b) => b.size - a.size), [], 12));
   };
   const animate = () => { paint(performance.now() / 1000 * 2 * Math.PI * Math.min(1, m.frequency_hz)); paintArrows(Math.cos(performance.now() / 1000 * 2 * Math.PI * Math.min(1, m.frequency_hz))); turning = requestAnimationFrame(animate); };
