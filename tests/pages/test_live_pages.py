@@ -133,7 +133,9 @@ def test_a_question_names_the_few_values_at_which_it_is_stable():
             "dragSaved('grid.load_9.scale', 0.9 * SAVED.grid['grid.load_9.scale'].find(x => x > 0.5))"
         )
         beside = view.inner_text("#outside")
+        others = view.inner_text("#between")
         browser.close()
+    assert "holds pod_q; gfor explore kundur opens the others of the case: manual," in others
     assert said == {
         "grid.load_7.scale": "Unstable at all of them.",
         "grid.load_9.scale": "Unstable at 0.2, 0.2615, 1, 1.308.",

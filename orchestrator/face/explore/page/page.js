@@ -159,6 +159,7 @@ async function begin() {
   if (!opened) { $("verdict").textContent = ""; return; }
   seen.titles = opened.scenarios;
   seen.systems = opened.systems;
+  if (SAVED) $("between").append(wordsOfOthers(opened));
   $("title").textContent = $("title").title = opened.title;
   document.title = `${opened.case}: gfor explore`;
   if (!(state.scenario in opened.scenarios)) state.scenario = seen.beginning.scenario;

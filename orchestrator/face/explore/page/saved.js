@@ -80,6 +80,11 @@ function wordsOfError() {
   const hidden = SAVED.cells.filter(one => one.least > one.most).length;
   return `While you drag, ≈ is interpolated: at ${most.length} values halfway, computed to know it, the least damped mode was off by ${number(least[last >> 1], 2)} points of damping as a rule and ${number(least[last], 2)} at most (any drawn mode: ${number(most[last], 2)}${hidden ? `; at ${hidden} of them a mode that is not drawn is damped least` : ""}). On release the nearest computed value is shown.`;
 }
+// Which scenarios of the case the page does not hold, and what opens them.
+function wordsOfOthers(opened) {
+  const others = Object.keys(opened.systems ?? {}).filter(name => !(name in opened.scenarios));
+  return others.length ? ` This page holds ${Object.keys(opened.scenarios).join(", ")}; gfor explore ${opened.case} opens the others of the case: ${others.join(", ")}.` : "";
+}
 // Damping of the least damped mode [%], below 0 where the system is unstable.
 function leastDampingOf(answer) {
   const one = answer.modes.scenarios[0], damping = leastOf(one.modes).damping_percent;
