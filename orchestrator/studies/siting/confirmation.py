@@ -3,6 +3,7 @@
 import cmath
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,8 +17,14 @@ from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.linearization import Blocks
 from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.linear.spectra.continuation import Eigenpair, pairs_near
-from orchestrator.linear.spectra.modes import Mode, damping_percent, damping_ratio, oscillations
-from orchestrator.studies.modes.modes import modes_from, running
+from orchestrator.linear.spectra.modes import (
+    Mode,
+    damping_percent,
+    damping_ratio,
+    make_mode,
+    oscillations,
+)
+from orchestrator.studies.modes.modes import ModesResult, modes_from, running
 from orchestrator.studies.pod_design.closed_loop import Placed, PodLoop, PodSetting
 from orchestrator.studies.pod_design.lead_lag import LARGEST_TURN, NO_COMPENSATION, lead_lag_turning
 from orchestrator.studies.siting.least_damping import GROWS, LeastDamping
@@ -40,6 +47,9 @@ the controller does not move."""
 
 # least similarity with which a mode of the system with the device is taken for the one without it
 _SAME = 0.5
+_BESIDE = 3
+"""Swings outside of the range that are followed to the system with the device, the least damped: each is searched."""
+
 _ONE = 1e-6  # two eigenvalues that differ by less than this part are one, computed in two ways
 
 
@@ -60,7 +70,7 @@ class SearchEnd:
 class Confirmation:
     """Results of the coupled FMUs at one bus: Δλ [rad/s] by a small gain of the tuned POD, or by a device without
     one, as predicted and as coupled; λ with the device, its POD off; the POD's setting and λ with it; the least
-    damped mode then [rad/s], which may be another one.
+    damped mode then [rad/s], which may be another one; and the least damped then of the swings outside of the range.
     """
 
     bus: str
@@ -73,6 +83,7 @@ class Confirmation:
     stable: bool | None = None
     failure: str = ""
     search: SearchEnd | None = None  # for the gain of the POD
+    beside: complex | None = None
 
     @property
     def error(self) -> float:
@@ -109,6 +120,13 @@ class Confirmation:
             return None
         return self.least
 
+    @property
+    def lower_beside(self) -> complex | None:
+        """The least damped swing outside of the range then [rad/s], if it has less damping than the mode followed."""
+        if self.beside is None or damping_ratio(self.beside) >= damping_ratio(self.reached):
+            return None
+        return self.beside
+
 
 def confirmed(
     prepared: PreparedScenario,
@@ -119,19 +137,27 @@ def confirmed(
     gain: float,
     *,
     known: Sequence[Mode] = (),
+    outside: Sequence[Mode] = (),
 ) -> Confirmation:
     """Compare a mode's predicted shift with that of the coupled FMUs.
 
     ``prepared``: With the device at the bus.
-    ``known``: modes of the system without it.
+    ``known``: modes of the system without it; ``outside``: its swings outside of the range.
     ``controller``: ``pod_p`` or ``pod_q``, of at most a gain [pu of the rating]; None for a device as it is."""
     try:
         with running(prepared) as master:
             if controller is None:
-                return _as_it_is(prepared, master, bus, seen, frequency_range)
+                return _as_it_is(prepared, master, bus, seen, frequency_range, outside=outside)
             find_operating_point(master)
             return _with_pod(
-                master, bus, seen, frequency_range, controller=controller, gain=gain, known=known
+                master,
+                bus,
+                seen,
+                frequency_range,
+                controller=controller,
+                gain=gain,
+                known=known,
+                outside=outside,
             )
     except CosimError as error:
         return Confirmation(bus, failure=str(error))
@@ -143,6 +169,8 @@ def _as_it_is(
     bus: str,
     seen: SeenMode,
     frequency_range: tuple[float, float],
+    *,
+    outside: Sequence[Mode],
 ) -> Confirmation:
     blocks = Blocks(master, derivatives=True)
     found = modes_from(prepared, master, find_operating_point(master), blocks, frequency_range)
@@ -150,7 +178,13 @@ def _as_it_is(
     predicted = _predicted(master, blocks.components[name_at(bus)], bus, seen) - eigenvalue
     coupled, least = pair.eigenvalue - eigenvalue, least_damped(found.modes, pair.eigenvalue)
     return Confirmation(
-        bus, predicted, coupled, pair.eigenvalue, least=least, stable=found.stability.stable
+        bus,
+        predicted,
+        coupled,
+        pair.eigenvalue,
+        least=least,
+        stable=found.stability.stable,
+        beside=_least_beside(outside, found.model),
     )
 
 
@@ -163,6 +197,7 @@ def _with_pod(
     controller: str,
     gain: float,
     known: Sequence[Mode],
+    outside: Sequence[Mode],
 ) -> Confirmation:
     name, eigenvalue = name_at(bus), seen.mode.eigenvalue
     loop = PodLoop(master, [name], controller)
@@ -194,6 +229,7 @@ def _with_pod(
         least=least,
         stable=looks.is_stable(tuned),
         search=search,
+        beside=_least_beside(outside, loop.model(tuned)),
     )
 
 
@@ -282,6 +318,26 @@ def same_mode(mode: Mode, model: LinearModel) -> Eigenpair:
             + Option.RATING
         )
     return pairs[best]
+
+
+def swings_outside(found: ModesResult) -> list[Mode]:
+    """The least damped of the swings outside of a study's range, with their shapes."""
+    values = () if found.hidden is None else found.hidden.electromechanical
+    return [_mode_at(found.model, value) for value in sorted(values, key=damping_ratio)[:_BESIDE]]
+
+
+def _mode_at(model: LinearModel, eigenvalue: complex) -> Mode:
+    pair = min(pairs_near(model, eigenvalue), key=lambda one: abs(one.eigenvalue - eigenvalue))
+    return make_mode(pair.eigenvalue, pair.left, pair.right, model.names)
+
+
+def _least_beside(outside: Sequence[Mode], model: LinearModel) -> complex | None:
+    """The least damped of these modes in a model with further states [rad/s]; None where none is found again."""
+    found = []
+    for mode in outside:
+        with suppress(AnalysisError):
+            found.append(same_mode(mode, model).eigenvalue)
+    return min(found, key=damping_ratio, default=None)
 
 
 def least_damped(modes: Sequence[Mode], followed: complex) -> complex:

@@ -21,6 +21,7 @@ from orchestrator.studies.siting.view import (
     end_of_search,
     least_then,
     with_damping,
+    with_it,
 )
 
 UNIT = "points of damping by 1 pu of voltage for 1 pu of speed, with its phase tuned"
@@ -117,7 +118,9 @@ def _confirmed(result: MachineSites, one: Confirmation, before: float) -> str:
     gain = "" if one.setting is None else f" (K {one.setting.gain:g} pu{end_of_search(one)})"
     off = f"prediction off by {100 * one.error:.2g} %"
     steps = f"{before:.2f} % → {one.damping:.2f} % with a POD{gain}"
-    return f"{one.bus}: {word} by coupled FMUs ({off}): {steps}; {least_then(one, before)}"
+    stable = "" if one in result.breaking else f"; {with_it(one)}"
+    then = f"{least_then(one, before)}{stable}"
+    return f"{one.bus}: {word} by coupled FMUs ({off}): {steps}; {then}"
 
 
 def remarks(result: MachineSites) -> list[str]:

@@ -35,7 +35,7 @@ from orchestrator.studies.operating_points.preparation import ItemPreparation, f
 from orchestrator.studies.points.request import OfCase, of_frequencies, of_scenario, of_values
 from orchestrator.studies.siting import placing
 from orchestrator.studies.siting.candidates import candidates, question_about, unit_terminals
-from orchestrator.studies.siting.confirmation import Confirmation, confirmed
+from orchestrator.studies.siting.confirmation import Confirmation, confirmed, swings_outside
 from orchestrator.studies.siting.residues import SeenMode, Situation, situation_of
 
 PODS = {"pod_p": placing.ACTIVE, "pod_q": placing.REACTIVE}
@@ -354,6 +354,7 @@ def _with_confirmations(
         )
     )
     found = []
+    outside = swings_outside(result.intact.found) if request.confirm else []
     for k, bus in enumerate(result.ranking[: request.confirm]):
         prepared = _prepared(placing.with_devices(result.case, device, [bus]), request, scenario)
         one = confirmed(
@@ -364,6 +365,7 @@ def _with_confirmations(
             request.controller,
             request.gain,
             known=result.intact.found.modes,
+            outside=outside,
         )
         found.append(one)
         report(k + 1)

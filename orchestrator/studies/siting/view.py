@@ -134,9 +134,11 @@ def answer_in_parts(result: SiteResult) -> tuple[str, str]:
     if result.by_coupled:
         return _best_confirmed(result, among)
     others = ", ".join(f"{bus} {100 * result.least(bus)[0] / most:.0f} %" for bus in best[1:])
+    tried = [one for one in result.confirmations if one.bus == best[0] and not one.failure]
+    then = "".join(f"; as it is now, {with_it(one)}" for one in tried)
     return (
         f"{best[0]} is the best place for {device_title(result)}{among}: {shift_text(result, most)} "
-        f"{unit(result, '100')}, for the least damped mode{after} ({_called(mode)})",
+        f"{unit(result, '100')}, for the least damped mode{after} ({_called(mode)}){then}",
         f"; of that {others}" if others else "",
     )
 
@@ -146,19 +148,38 @@ def _best_confirmed(result: SiteResult, among: str) -> tuple[str, str]:
     first, *others = [one for one in result.confirmations if not one.failure]
     seen = result.intact.modes[0]
     pod = "" if result.request.controller is None else " and its POD"
-    then = ", ".join(f"{one.bus} {one.damping:.2f} %" for one in others)
+    then = ", ".join(f"{one.damping:.2f} % ({one.bus})" for one in others)
     by_support = sorted(result.ranking, key=lambda bus: -result.least(bus)[0])
     small = ", ".join(f"{bus} {shift_text(result, result.least(bus)[0])}" for bus in by_support[:3])
-    order = f"the order of the {len(result.confirmations)} places that coupled FMUs computed"
     before = seen.mode.damping_percent
     lower = first.other is not None and damping_percent(first.other) < before
     but = f", but {least_then(first, before)}" if lower else ""
     steps = f"{before:.2f} % → {first.damping:.2f} % for {title_of_mode(seen.label, seen.mode)}"
     return (
-        f"{first.bus} is the best place for {device_title(result)}{among}: {steps}{but}",
-        f"; this is the least damped mode without it, with {_rated(result)}{pod}; then {then}: {order}. "
-        f"By {unit(result, '100')} it is {small}",
+        f"{first.bus} is the best place for {device_title(result)}{among}: {steps}{but}; {with_it(first)}",
+        f"; the least damped mode without the device is {title_of_mode(seen.label, seen.mode)}. "
+        f"With {_rated(result)}{pod} at the next best places it has {then}, as coupled FMUs say. "
+        f"By {unit(result, '100')} the best are {small}",
     )
+
+
+def with_it(one: Confirmation) -> str:
+    """Tell whether the system is stable with the device, and which swing that was not looked at has less damping."""
+    return f"{_stable_with_it(one)}{_lower_beside(one)}"
+
+
+def _stable_with_it(one: Confirmation) -> str:
+    if one.stable is None:
+        return "whether the system is stable with it is not known"
+    return f"the system is {'stable' if one.stable else 'UNSTABLE'} with it"
+
+
+def _lower_beside(one: Confirmation) -> str:
+    beside = one.lower_beside
+    if beside is None:
+        return ""
+    hertz = f"{beside.imag / math.tau:.3f} Hz"
+    return f", and a swing outside of --range has less: {damping_percent(beside):.2f} % at {hertz}"
 
 
 def _as_sentence(part: str) -> str:
@@ -221,7 +242,9 @@ def _confirmed(result: SiteResult, one: Confirmation, before: float) -> str:
     if one in result.breaking:
         word += ", but UNSTABLE with it (`gfor modes` of a case with it tells the cause, often the step)"
     off = f"prediction off by {100 * one.error:.2g} %"
-    return f"{one.bus}: {word} by coupled FMUs ({off}): {steps}; {least_then(one, before)}"
+    stable = "" if one in result.breaking else f"; {_stable_with_it(one)}"
+    then = f"{least_then(one, before)}{stable}{_lower_beside(one)}"
+    return f"{one.bus}: {word} by coupled FMUs ({off}): {steps}; {then}"
 
 
 def end_of_search(one: Confirmation) -> str:
@@ -239,7 +262,8 @@ def end_of_search(one: Confirmation) -> str:
 def least_then(one: Confirmation, before: float) -> str:
     """The least damped mode with the device: whether it is another one, and has less than the least before."""
     if one.other is None:
-        return "it stays the least damped"
+        among = "" if one.lower_beside is None else " of the range"
+        return f"it stays the least damped{among}"
     percent = damping_percent(one.other)
     worse = f", LESS than the least before, {before:.2f} %" if percent < before else ""
     return f"least damped then is another mode: {one.other.imag / math.tau:.3f} Hz, {percent:.2f} %{worse}"
@@ -256,6 +280,7 @@ def remarks(result: SiteResult) -> list[str]:
     for seen in result.intact.modes:
         shifts = result.shifts[DEVICE][result.intact.name][seen.label]
         top = max(shifts, key=lambda bus: abs(shifts[bus].change))
+        strongest = top if top in result.ranking else "the strongest place"
         reach = max(
             abs(s.damping) for s in result.shifts[ACTIVE][result.intact.name][seen.label].values()
         )
@@ -264,9 +289,8 @@ def remarks(result: SiteResult) -> list[str]:
                 f"{_called(seen)}: no bus reaches this mode; it cannot be damped from the network"
             )
         elif shifts[best].hardly:
-            said.append(
-                f"{_called(seen)}: not controllable at {best} ({100 * shifts[best].part:.1g} % of {top})"
-            )
+            part = f"{100 * shifts[best].part:.1g} % of {strongest}"
+            said.append(f"{_called(seen)}: not controllable at {best} ({part})")
     said += [f"not judged: {open_point}" for open_point in open_points(result)]
     if result.terminals:
         there = few(result.terminals, _NAMED)
@@ -406,6 +430,9 @@ def confirmation_json(one: Confirmation, place: str = "bus") -> dict[str, Any]:
         if one.least is None
         else eigenvalue_json(one.least, damping_percent(one.least)),
         "least_damped_is_another_mode": one.other is not None,
+        "least_damped_outside_of_range": None
+        if one.beside is None
+        else eigenvalue_json(one.beside, damping_percent(one.beside)),
         "stable": one.stable,
         "pod": pod,
     }
@@ -464,7 +491,8 @@ def _page(result: SiteResult) -> str:
         Figures(),
         f"{result.case.table.title or result.case.name}: where to put {device_title(result)}",
     )
-    shade = "good" if result.agrees and result.confirmations else "soft"
+    sure = result.agrees and all(one.stable for one in result.confirmations[:1])
+    shade = "good" if sure and result.confirmations else "soft"
     unconfirmed = [] if result.confirmations else sureness(result)[-1:]
     lines = "".join(f"<li>{escape(text)}</li>" for text in (*unconfirmed, *remarks(result)))
     unstable = "".join(f'<p class="bad">{escape(text)}</p>' for text in _unstable(result))
@@ -527,7 +555,8 @@ def _verdict_on(result: SiteResult, one: Confirmation) -> tuple[str, bool]:
         return f"NOT CONFIRMED: {one.failure}", False
     if one in result.breaking:
         return "UNSTABLE with it", False
-    return ("confirmed", True) if one.agrees else ("NOT CONFIRMED", False)
+    word = "confirmed" if one.agrees else "NOT CONFIRMED"
+    return f"{word}; {_stable_with_it(one)}", one.agrees and one.stable is True
 
 
 def _map(result: SiteResult, seen: SeenMode, figures: Figures) -> str:

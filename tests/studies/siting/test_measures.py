@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
+from orchestrator.cases.case import load_case
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.studies.pod_design.closed_loop import PodSetting
 from orchestrator.studies.pod_design.lead_lag import NO_COMPENSATION
@@ -30,6 +31,9 @@ from tests.support.scenarios import prepare_one
 @pytest.fixture(scope="module")
 def five(tmp_path_factory):
     return five_machines(tmp_path_factory.mktemp("five"))
+
+
+STABLE = "the system is stable with it"
 
 
 def eigenvalue(damping):
@@ -86,13 +90,59 @@ def test_the_headline_ranks_as_the_confirmation_does(five, monkeypatch):
     assert said.startswith("bus_15 is the best place for POD-P of those asked for: ")
     first, further = Siting(found).answer_lines
     worse = f"another mode: 1.746 Hz, 7.50 %, LESS than the least before, {before}"
-    assert first.endswith(f"for: {before} → 9.64 % for {at}, but least damped then is {worse}")
-    assert further.startswith("This is the least damped mode without it, with the device of ")
+    assert first.endswith(
+        f"for: {before} → 9.64 % for {at}, but least damped then is {worse}; {STABLE}"
+    )
+    assert further.startswith(f"The least damped mode without the device is {at}. With the device ")
     assert "least damped then" not in further
-    assert "then bus_12 9.30 %, bus_11 8.13 %" in said
-    assert said.rpartition("it is ")[2].startswith("bus_11 +")
+    assert "next best places it has 9.30 % (bus_12), 8.13 % (bus_11)" in said
+    assert said.rpartition("the best are ")[2].startswith("bus_11 +")
     assert [bus["bus"] for bus in as_json(found)["buses"]] == list(found.ranking)
     assert as_json(found)["ranked_by"] == "damping with the device, by coupled FMUs"
+
+
+@pytest.mark.parametrize(
+    ("stable", "said"),
+    [
+        (True, "the system is stable with it"),
+        (False, "the system is UNSTABLE with it"),
+        (None, "whether the system is stable with it is not known"),
+    ],
+)
+def test_the_headline_says_whether_the_system_is_stable_with_the_device(
+    five, monkeypatch, stable, said
+):
+    """Of a system that grows without the device, too: what breaks a stable one is never the first."""
+    found = planted(monkeypatch, five, bus_11=(4.61, 8.13, True), bus_12=(4.0, 9.30, True))
+    first, second = (replace(one, stable=stable) for one in found.confirmations)
+    found = replace(found, confirmations=(first, second))
+    assert Siting(found).answer_lines[0].endswith(f"; {said}")
+    assert f"confirmed; {said}" in Siting(found).page_text() or first in found.breaking
+
+
+def test_a_swing_outside_of_the_range_with_less_damping_is_in_the_headline(five, monkeypatch):
+    found = planted(monkeypatch, five, bus_11=(4.61, 8.13, True), bus_12=(4.0, 9.30, True))
+    first, second = found.confirmations
+    for damping, said in ((5.27, True), (12.0, False)):
+        beside = 13.0 * complex(-damping / 100, (1 - (damping / 100) ** 2) ** 0.5)
+        shown = replace(found, confirmations=(replace(first, beside=beside), second))
+        text = ", and a swing outside of --range has less: 5.27 % at 2.066 Hz"
+        assert Siting(shown).answer_lines[0].endswith(text) is said
+        outside = as_json(shown)["confirmed"][0]["least_damped_outside_of_range"]
+        assert outside["damping_percent"] == pytest.approx(damping)
+    assert as_json(found)["confirmed"][0]["least_damped_outside_of_range"] is None
+
+
+@pytest.mark.slow
+def test_a_swing_outside_of_the_range_is_followed_to_the_system_with_the_device():
+    """The one of 2.03 Hz and 5.2 % of wscc9, beside 26 % that the POD brings to that of 1.3 Hz."""
+    found = find_sites(load_case("wscc9"), SiteRequest("pod_p", confirm=2))
+    assert ", and a swing outside of --range has less: 5.2" in Siting(found).answer_lines[0]
+    one = found.confirmations[0]
+    assert one.stable
+    assert one.damping > 20
+    assert one.beside.imag / (2 * np.pi) == pytest.approx(2.035, abs=0.01)
+    assert "it stays the least damped of the range" in " ".join(sureness(found))
 
 
 def test_what_the_device_brings_without_its_pod_stands_in_a_column(five, monkeypatch):

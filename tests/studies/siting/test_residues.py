@@ -177,7 +177,7 @@ def test_the_json_has_a_shift_for_each_bus_and_mode(gfor, tmp_path):
     page = (tmp_path / "site.html").read_text(encoding="utf-8")
     top = page[page.index('<div class="findings">') : page.index("<section")]
     with_pod = f"{found['confirmed'][0]['damping_percent']:.2f}"
-    assert '<b class="good">confirmed</b>' in top
+    assert '<b class="good">confirmed; the system is stable with it</b>' in top
     assert f"<td>{with_pod}</td>" in top
 
 
@@ -196,7 +196,7 @@ def test_the_json_has_a_shift_for_each_bus_and_mode(gfor, tmp_path):
         ),
         (
             ["two_area_rms", "--scenario", "gfor", "--outages", "line_9"],
-            "no unit, line, load or shunt 'line_9'",
+            "no unit, line, DC line, load or shunt 'line_9'",
         ),
         (
             ["two_area_rms", "--scenario", "gfor", "--rating", "-5"],
