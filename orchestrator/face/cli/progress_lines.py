@@ -26,6 +26,7 @@ class ProgressLines:
         self._name, self._counted, self._shown = name, counted, shown
         self._done = self._total = 0
         self._stored: int | None = None  # what was there already when the first count came
+        self._told = -1  # what the line before said is done
         self._began, self._ended = monotonic(), Event()
         self._thread = Thread(target=self._say_now_and_then, daemon=True)
 
@@ -51,7 +52,7 @@ class ProgressLines:
             self._thread.join()
 
     def line(self) -> str:
-        """Return what is said now."""
+        """Return what is said now; while nothing is done since the line before, how long it takes is not guessed."""
         passed = monotonic() - self._began
         if not self._total:
             return f"{self._name}: preparing, {_in_words(passed)}"
@@ -59,8 +60,10 @@ class ProgressLines:
         # of a task that is under way, some parts may be done; all are not before its record is there
         under_way = min(stored + parts_done(), self._total - 1)
         done = max(self._done, under_way)
-        text = f"{self._name}: {done} of {self._total} {self._counted}, {_in_words(passed)}"
-        if done <= stored:
+        still, self._told = done == self._told, done
+        at = "still at " if still else ""
+        text = f"{self._name}: {at}{done} of {self._total} {self._counted}, {_in_words(passed)}"
+        if still or done <= stored:
             return text
         left = passed * (self._total - done) / (done - stored)
         return f"{text}, about {_in_words(left)} left"

@@ -327,10 +327,10 @@ class PointsDesign:
 def design_over_points(
     plan: PointsDesignPlan, work: Work, stage: Callable[[str], None] = lambda text: None
 ) -> PointsDesign:
+    # each point is computed twice, and counted once: half of the count is that without the controllers
     stage("operating points without the controllers")
-    before = modes_at(
-        plan, plan.off, plan.candidates, replace(work, report=lambda n, of: work.report(n, 2 * of))
-    )
+    first = replace(work, report=lambda n, of: work.report((n + 1) // 2, of))
+    before = modes_at(plan, plan.off, plan.candidates, first)
     usable = [k for k, point in enumerate(before) if point.loops is not None]
     if not usable:
         raise AnalysisError(
@@ -350,7 +350,7 @@ def design_over_points(
     best = _search(search, plan, stage)
     settings, setting = tuple(space.group_settings(best.tried.x)), space.setting(best.tried.x)
     stage("operating points with the controllers")
-    then = replace(work, report=lambda n, of: work.report(of + n, 2 * of))
+    then = replace(work, report=lambda n, of: work.report((of + 1) // 2 + n * (of // 2) // of, of))
     after = modes_at(plan, values_of(plan.groups, settings), (), then)
     after = with_followed_names(plan.aim.names, before, after, setting)
     stage("ranking")

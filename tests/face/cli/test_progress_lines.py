@@ -86,9 +86,24 @@ def test_what_was_there_already_does_not_make_the_time_left_short(monkeypatch):
     lines.report(8, 10)
     assert lines.line() == "sweep: 8 of 10 points, 60 s, about 60 s left"
     now[0] += 90.0
-    assert lines.line() == "sweep: 8 of 10 points, 2.5 min, about 2.5 min left"
-    now[0] += 510.0
-    assert lines.line() == "sweep: 8 of 10 points, 11 min, about 11 min left"
+    lines.report(9, 10)
+    assert lines.line() == "sweep: 9 of 10 points, 2.5 min, about 50 s left"
+
+
+def test_while_nothing_is_done_the_time_left_does_not_grow(monkeypatch):
+    """A count that stood still was once told with "about 45 s left", then "about 90 s left"."""
+    now = [100.0]
+    monkeypatch.setattr(progress_lines, "monotonic", lambda: now[0])
+    lines = ProgressLines("run", "steps", shown=False)
+    lines.report(0, 1000)
+    lines.report(400, 1000)
+    now[0] += 30.0
+    assert lines.line() == "run: 400 of 1000 steps, 30 s, about 45 s left"
+    now[0] += 30.0
+    assert lines.line() == "run: still at 400 of 1000 steps, 60 s"
+    now[0] += 30.0
+    lines.report(600, 1000)
+    assert lines.line() == "run: 600 of 1000 steps, 90 s, about 60 s left"
 
 
 def test_parts_that_are_told_twice_are_never_all():

@@ -286,8 +286,15 @@ def test_points_without_modes_leave_the_verdict_not_known(planned, store, monkey
     assert len(verdict.failed) == 4
     assert "4 of 8 have no modes (4 islanding)" in verdict_sentence(verdict)
     assert "bus_2 cut off" in " ".join(remarks(verdict))
-    fine = design_over_points(planned("pod_p", damping=0.1), Work(Serial(), store)).verdict
+    told = []
+    work = Work(Serial(), store, lambda done, total: told.append((done, total)))
+    fine = design_over_points(planned("pod_p", damping=0.1), work).verdict
     assert fine.met is True
+    assert {total for _, total in told} == {
+        4
+    }  # the points that were given, though each is computed twice
+    assert told == sorted(told)
+    assert told[-1] == (4, 4)
     assert "REACHED: 10 % at all 4 points" in verdict_sentence(fine)
 
 
