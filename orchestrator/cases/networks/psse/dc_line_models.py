@@ -108,13 +108,17 @@ def _solved_line(
     if not pole.current > 0:
         return None
     first, second = device.endings(voltages)
-    at = {load.bus: load for load in loads}
+    own = iter(loads)  # of the ends within what is studied, in their order; both may be at one bus
+    studied = {load.bus for load in loads}
+    at_rectifier, at_inverter = (
+        next(own) if f"bus_{end.bus}" in studied else None for end in (first, second)
+    )
     return SolvedLine(
         device,
         pole,
         v=(voltages[first.bus], voltages[second.bus]),
         fed=(first.fed, second.fed),
-        loads=(at.get(f"bus_{first.bus}"), at.get(f"bus_{second.bus}")),
+        loads=(at_rectifier, at_inverter),
     )
 
 

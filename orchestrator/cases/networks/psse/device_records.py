@@ -171,6 +171,7 @@ def _two_terminal(raw: RawFile, lines: Sequence[Record], places: Places) -> TwoT
     scheduled = head.number(4, "VSCHD [kV]", 0.0)
     if not scheduled > 0:
         raise head.error(f"VSCHD is {scheduled:g} kV; it must exceed 0")
+    _require_two_buses(head, ends)
     # the node of the commutating bus stands before the controlling transformer from revision 35 on
     capacitor = 17 if raw.revision >= NODES else 16
     rectifier, inverter = (_bridges(line, capacitor) for line in ends)
@@ -189,6 +190,18 @@ def _two_terminal(raw: RawFile, lines: Sequence[Record], places: Places) -> TwoT
         buses=(_bus(ends[0], 0, places), _bus(ends[1], 0, places)),
         bridges=(rectifier, inverter),
     )
+
+
+def _require_two_buses(head: Record, ends: Sequence[Record]) -> None:
+    """Raise an `InputError` for a DC line from a bus to itself.
+
+    Buses that a line without impedance makes one are two in the record: such a line is taken."""
+    rectifier, inverter = (abs(line.whole(0, "the bus' number")) for line in ends)
+    if rectifier == inverter:
+        raise head.error(
+            f"the DC line {head.text(0)!r} has its rectifier and its inverter at one bus, {rectifier}: it "
+            f"joins nothing; correct the bus of one of them, or write {without_kinds(['two-terminal dc'])}"
+        )
 
 
 def _vsc_line(raw: RawFile, lines: Sequence[Record], places: Places) -> VscLine:

@@ -44,8 +44,11 @@ def lines(*changes):
 def prepared(tmp_path):
     """Text of the line's record of dynamics data → the case, ready to run; with a model it records that."""
 
-    def build(text=CDC4T, units="", dc=None, case=PHASORS, *, recorded=False, **overrides):
+    def build(
+        text=CDC4T, units="", dc=None, case=PHASORS, *, recorded=False, joined=False, **overrides
+    ):
         found = records(33)
+        found["BRANCH"] += ["5,8,'1 ',0,1e-6,0,0,0,0,0,0,0,0,1,1,0,1,1"] if joined else []
         found["TWO-TERMINAL DC"] = lines() if dc is None else dc
         (tmp_path / "grid.raw").write_text(raw(33, found))
         (tmp_path / "grid.dyr").write_text(DYR + text)
@@ -95,6 +98,28 @@ def test_a_line_with_a_record_is_a_station_at_each_bus(prepared):
     assert used == {"CDC4T": "used", "two-terminal dc": "used"}
     assert "CDC4T: 1 DC line with the model of its record, 60 MW" in texts(ready)
     assert "without dynamics" not in texts(ready)
+
+
+def test_ends_at_buses_that_are_one_are_two_stations(prepared):
+    """A line without impedance joins the DC line's buses: each station has its own power and wires."""
+    ready = prepared(joined=True)
+    rectifier, inverter = "dc_TIE_1_5", "dc_TIE_1_5_2"
+    plans, fed = ready.system.components, sources(ready)
+    current = (math.sqrt(250**2 + 4 * 8 * 60) - 250) / 16
+    first, second = (plans[name].parameters for name in (rectifier, inverter))
+    assert first["P_0"] * first["S_n"] == pytest.approx(-60)
+    assert second["P_0"] * second["S_n"] == pytest.approx(250 * current)
+    assert fed[f"{rectifier}.inverter.V_most"] == f"{inverter}.V_most"
+    assert fed[f"{inverter}.I_dc"] == f"{rectifier}.inverter_I"
+    assert fed[f"{rectifier}.v_re"] == fed[f"{inverter}.v_re"] == "grid.bus_5.v_re"
+
+
+@pytest.mark.parametrize("text", [CDC4T, ""], ids=["with a record", "without"])
+def test_a_line_from_a_bus_to_itself_is_one_error_at_its_record(prepared, text):
+    with pytest.raises((CaseError, InputError)) as refused:
+        prepared(text, dc=lines(("8,1,22", "5,1,22")))
+    assert str(refused.value).count("has its rectifier and its inverter at one bus, 5") == 1
+    assert "has no variable" not in str(refused.value)
 
 
 @pytest.mark.parametrize(

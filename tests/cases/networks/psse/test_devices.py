@@ -509,10 +509,20 @@ def test_a_rating_leaves_room_for_reactive_power(read):
     assert "takes the whole rating (SMAX, IMAX)" in texts(data)
 
 
-def test_both_ends_at_one_bus_are_two_loads(read):
-    """The line's losses are what both feed together."""
+def test_both_ends_at_buses_that_are_one_are_two_loads(read):
+    """A line without impedance joins them; the DC line's losses are what both feed together."""
     current = (math.sqrt(250**2 + 4 * 8 * 60) - 250) / 16
-    lines = [line.replace("8,1,22", "5,1,22") for line in lines_of("TWO-TERMINAL DC", 33)]
-    found = fed(read({"TWO-TERMINAL DC": lines}))
+    join = ["5,8,'1 ',0,1e-6,0,0,0,0,0,0,0,0,1,1,0,1,1"]
+    found = fed(read({"TWO-TERMINAL DC": lines_of("TWO-TERMINAL DC", 33), "BRANCH": join}))
     assert list(found) == ["dc_TIE_1_5", "dc_TIE_1_5_2"]
     assert sum(found.values()).real == pytest.approx(-8 * current**2)
+
+
+def test_a_dc_line_from_a_bus_to_itself_is_refused_and_the_remedy_works(read):
+    lines = [line.replace("8,1,22", "5,1,22") for line in lines_of("TWO-TERMINAL DC", 33)]
+    number = raw(33, records(33) | {"TWO-TERMINAL DC": lines}).splitlines().index(lines[0]) + 1
+    words = rf"line {number}: the DC line 'TIE 1' has its rectifier and its inverter at one bus, 5:"
+    with pytest.raises(InputError, match=words) as refused:
+        read({"TWO-TERMINAL DC": lines})
+    assert "leave_out = ['two-terminal dc']" in str(refused.value).replace('"', "'")
+    assert not fed(read({"TWO-TERMINAL DC": lines}, leave_out=("two-terminal dc",)))
