@@ -24,6 +24,9 @@ _ENDS: Mapping[str, int] = {
 }
 """Section → columns with the numbers of buses, from the first one on."""
 
+_VERBS: Mapping[str, str] = {"load": "draws", "generator": "feeds"}
+"""Section → what its elements do with their power."""
+
 
 @dataclass(frozen=True)
 class KnownElements:
@@ -47,7 +50,7 @@ def with_known_buses(raw: RawFile) -> KnownElements:
             if missing and (column is None or record.whole(column, "the status", 1)):
                 named = " and ".join(str(bus) for bus in missing)
                 dropped[record.line] = Remark(
-                    f"not used: the file has no bus {named}",
+                    f"not used: the file has no bus {named}{_lost(section, record)}",
                     "an element at a bus that the file has not",
                 )
             else:
@@ -58,6 +61,27 @@ def with_known_buses(raw: RawFile) -> KnownElements:
         if dropped
         else KnownElements(raw, {})
     )
+
+
+def _lost(section: str, record: Record) -> str:
+    """Return which power the network lacks without an element, such as ``; the 10 MW that it draws drop out``."""
+    amounts = [
+        f"{x:g} {unit}"
+        for x, unit in zip(_power(section, record), ("MW", "Mvar"), strict=True)
+        if x
+    ]
+    return f"; the {' and '.join(amounts)} that it {_VERBS[section]} drop out" if amounts else ""
+
+
+def _power(section: str, record: Record) -> tuple[float, float]:
+    """Return what a load draws at 1 pu, or a machine feeds [MW, Mvar]; 0 of other elements."""
+    if section == "generator":
+        return record.number(2, "PG", 0.0), record.number(3, "QG", 0.0)
+    if section != "load":
+        return 0.0, 0.0
+    names = ("PL", "QL", "IP", "IQ", "YP", "YQ")
+    pl, ql, ip, iq, yp, yq = (record.number(5 + k, name, 0.0) for k, name in enumerate(names))
+    return pl + ip + yp, ql + iq - yq  # YQ is positive where it generates
 
 
 def status_columns(revision: int) -> dict[str, int]:

@@ -70,25 +70,32 @@ def test_the_largest_machine_stands_in_for_a_reference_that_is_missing(read):
 
 
 @pytest.mark.parametrize(
-    ("section", "lines"),
+    ("section", "lines", "lost"),
     [
-        ("LOAD", ["77,'1 ',1,1,1,10,5,0,0,0,0,1,1,0"]),
-        ("FIXED SHUNT", ["77,'1 ',1,0,5"]),
-        ("SWITCHED SHUNT", ["77,1,0,1,1.1,0.9,0,100,'',10.0,1,10.0"]),
-        ("GENERATOR", [MACHINE.replace("20,", "77,", 1)]),
-        ("BRANCH", ["4,77,'1 ',0.01,0.1,0,0,0,0,0,0,0,0,1"]),
+        (
+            "LOAD",
+            ["77,'1 ',1,1,1,10,5,2,0,0,-1,1,1,0"],
+            "; the 12 MW and 6 Mvar that it draws drop out",
+        ),
+        ("FIXED SHUNT", ["77,'1 ',1,0,5"], ""),
+        ("SWITCHED SHUNT", ["77,1,0,1,1.1,0.9,0,100,'',10.0,1,10.0"], ""),
+        ("GENERATOR", [MACHINE.replace("20,", "77,", 1)], "; the 10 MW that it feeds drop out"),
+        ("BRANCH", ["4,77,'1 ',0.01,0.1,0,0,0,0,0,0,0,0,1"], ""),
         (
             "TRANSFORMER",
             ["4,77,0,'1 ',1,1,1,0,0,2,'T',1", "0,0.1,100", "1.0,0,0,0,0,0,0", "1.0,0"],
+            "",
         ),
     ],
 )
-def test_an_element_at_a_bus_that_is_not_there_is_told_and_not_used(section, lines, read, tmp_path):
+def test_an_element_at_a_bus_that_is_not_there_is_told_and_not_used(
+    section, lines, lost, read, tmp_path
+):
     found, plain = records(33), read(records(33))
     found[section] = [*found[section], *lines]
     data = read(found)
     (said,) = data.changes
-    assert said.text == "not used: the file has no bus 77"
+    assert said.text == f"not used: the file has no bus 77{lost}"
     number = raw(33, found).splitlines().index(lines[0]) + 1
     assert said.place.endswith(f"grid.raw, line {number}")
     assert solved(data).voltages == solved(plain).voltages
