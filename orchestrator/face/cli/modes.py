@@ -114,7 +114,8 @@ def _compute(
         terminal.print_json(modes_json(results, weights, said))
         return exit_code(options, [r.stability for r in results])
     console = terminal.make_console(names=results[0].prepared.names if results else None)
-    print_answers(console, [of_modes(r) for r in results], results, said)
+    answers = [of_modes(r) for r in results]
+    print_answers(console, answers, results, said, details=options.details)
     terminal.print_warnings(results)
     terminal.say("question", weights)
     whole = len(results) == 1 or options.details

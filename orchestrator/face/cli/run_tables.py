@@ -59,7 +59,8 @@ def print_run(
         console.print(words, soft_wrap=True, highlight=False)
     modes = [r.modes for r in results]
     faults = dict.fromkeys(fault.in_words for m in modes for fault in m.prepared.faults)
-    print_answers(console, [of_run(r) for r in results], modes, [*beside, *faults])
+    answers = [of_run(r) for r in results]
+    print_answers(console, answers, modes, [*beside, *faults], details=details)
     print_named_modes(console, modes)
     print_sources(console, modes)
     ring_downs = tables.ring_downs(results)

@@ -65,6 +65,8 @@ def print_answers(
     answers: Sequence[ScenarioAnswer],
     results: Sequence[ModesResult],
     beside: Sequence[str],
+    *,
+    details: bool,
 ) -> None:
     ranges = [r.hidden.frequency_range for r in results if r.hidden is not None]
     looked_at = ranges[0] if ranges else ELECTROMECHANICAL_HZ
@@ -73,7 +75,7 @@ def print_answers(
     if others.figures:
         print_reference(console, results)
     print_parts(console, map(escape, beside))
-    rest = outside(results)
+    rest = outside(results, details=details)
     if rest:
         console.print(escape(rest), style="dim", soft_wrap=True, highlight=False)
     console.print("")

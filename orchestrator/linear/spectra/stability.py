@@ -82,10 +82,22 @@ class Hidden:
             f"{z.imag / (2 * np.pi):.4g} Hz, {damping_percent(z):.2f} %"
             for z in self.electromechanical
         ]
-        highest = max(z.imag for z in self.electromechanical) / (2 * np.pi)
-        wide = f"{min(low, self._lowest_swing):.2g}:{max(high, np.ceil(10 * highest) / 10):g}"
         text += f"; electromechanical: {few(shown, _SWINGS_SHOWN, '; ')}"
-        return (f"{text}: show them by " + Option.RANGE + f" {wide}") if remedy else text
+        return (f"{text}: show them by " + Option.RANGE + f" {self.wide}") if remedy else text
+
+    @property
+    def wide(self) -> str:
+        """The range [Hz], as it is typed, that holds all swings of generators as well."""
+        low, high = self.frequency_range
+        if not self.electromechanical:
+            return f"{low:g}:{high:g}"
+        highest = max(z.imag for z in self.electromechanical) / (2 * np.pi)
+        return f"{min(low, self._lowest_swing):.2g}:{max(high, np.ceil(10 * highest) / 10):g}"
+
+    @property
+    def least_swing(self) -> complex | None:
+        """The least damped mode [rad/s] in which generators swing; None where none is known."""
+        return min(self.electromechanical, key=damping_percent, default=None)
 
     def as_json(self) -> dict[str, Any]:
         """The number and the least damped of the hidden modes as JSON's types."""

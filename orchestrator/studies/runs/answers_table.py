@@ -1,18 +1,20 @@
 """Answers of scenarios as a table for a terminal, and what lies outside of its range."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rich.table import Table
 from rich.text import Text
 
-from orchestrator.linear.spectra.modes import Mode
+from orchestrator.core.options import Option, command
+from orchestrator.linear.spectra.modes import Mode, damping_percent
 from orchestrator.output.report.colours import OF_VERDICTS
 from orchestrator.output.report.short_texts import LONGEST_REMARK, short
 from orchestrator.output.report.terminal_tables import make_table
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.runs.answer import ScenarioAnswer
-from orchestrator.studies.runs.answer_of_modes import name_of_answers
+from orchestrator.studies.runs.answer_of_modes import least_damped, name_of_answers
 
 
 @dataclass(frozen=True)
@@ -78,8 +80,12 @@ def _figures(modes: Sequence[Mode], theirs: tuple[float, float] | None = None) -
     return " → ".join(hertz) or "–", " → ".join(percent) or "–"
 
 
-def outside(results: Sequence[ModesResult]) -> str:
-    """How many modes lie outside of the range, which are mostly the network's own; "" where it is not known."""
+def outside(results: Sequence[ModesResult], *, details: bool = False) -> str:
+    """How many modes lie outside of the range, which are mostly the network's own; "" where it is not known.
+
+    Machines may swing there with less damping than the answers have: that mode is named.
+
+    ``details``: whether the details are told anyway."""
     counts = sorted({r.hidden.count for r in results if r.hidden is not None})
     if not counts or counts == [0]:
         return ""
@@ -93,4 +99,31 @@ def outside(results: Sequence[ModesResult]) -> str:
         if swings.electromechanical
         else ""
     )
-    return f"Outside of the range: {number} oscillatory modes{wide}; --details tells of them."
+    further = "" if details else "; --details tells of them"
+    return (
+        f"Outside of the range: {number} oscillatory modes{wide}{_least_swing(results)}{further}."
+    )
+
+
+def _least_swing(results: Sequence[ModesResult]) -> str:
+    """The least damped swing of machines outside of the range, where it has less damping than the scenario's answer."""
+    found, answers = [], []
+    for result in results:
+        swing = None if result.hidden is None else result.hidden.least_swing
+        answered = least_damped(result)
+        answers += [answered] if answered else []
+        if swing is None:
+            continue
+        percent = damping_percent(swing)
+        if answered is None or percent < answered.damping_percent:
+            text = f"{swing.imag / math.tau:.3f} Hz, {percent:.2f} %"
+            found.append((percent, text, result))
+    if not found:
+        return ""
+    _, text, result = min(found, key=lambda entry: entry[0])
+    everywhere = len(found) == len(results) and len({told for _, told, _ in found}) == 1
+    where = "" if everywhere else f", in {result.prepared.title}"
+    wide = "" if result.hidden is None else result.hidden.wide
+    typed = command("modes CASE", (Option.RANGE, wide))
+    worse = "LESS damped than those above" if answers else "the least damped"
+    return f", {worse}: {text}{where} ({typed})"

@@ -10,12 +10,12 @@ import pytest
 from orchestrator.cases.form.schema import KindTable
 from orchestrator.face.cli import main
 from orchestrator.linear.spectra.modes import make_mode
-from orchestrator.linear.spectra.stability import Stability
+from orchestrator.linear.spectra.stability import Hidden, Stability
 from orchestrator.output.report.short_texts import LONGEST_REMARK
 from orchestrator.simulation.watch.finding import Finding
 from orchestrator.studies.runs.answer_of_modes import of_modes
 from orchestrator.studies.runs.answer_of_run import of_run
-from orchestrator.studies.runs.answers_table import answers_table
+from orchestrator.studies.runs.answers_table import answers_table, outside
 from orchestrator.studies.runs.run import RunResult
 from tests.support.scenarios import bare_scenario
 
@@ -186,3 +186,22 @@ def test_a_swing_that_grows_beside_a_faster_root_is_named():
     remark = of_modes(run.modes).remark
     assert remark.startswith("grows at +0.06 1/s without oscillation: sg1.machine.omega; ")
     assert "the mode at 0.637 Hz grows as well: sg1 against sg2" in remark
+
+
+@pytest.mark.parametrize(
+    ("damping", "named"),
+    [
+        # 2.21 Hz with less than the answer's 4 %, and with more
+        (-0.4, "of which machines swing in 1, LESS damped than those above: 2.210 Hz, 2.88 %"),
+        (-4.0, "of which machines swing in 1; --details"),
+    ],
+)
+def test_a_swing_outside_of_the_range_is_named_where_it_has_less_damping(damping, named):
+    modes = result().modes
+    swing = complex(damping, 2 * np.pi * 2.21)
+    modes.hidden = Hidden((0.1, 2.0), 9, swing, (swing,))
+    text = outside([modes])
+    assert named in text
+    assert text.endswith("; --details tells of them.")
+    assert ("(`gfor modes CASE --range 0.1:2.3`)" in text) == (damping == -0.4)
+    assert "--details" not in outside([modes], details=True)
