@@ -2,6 +2,7 @@
 
 import argparse
 import shlex
+from collections.abc import Mapping
 from contextlib import suppress
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -9,6 +10,7 @@ from shutil import rmtree
 
 from rich.markup import escape
 
+from orchestrator.cases.form.schema import Value
 from orchestrator.cases.questions.idle_values import DAMPING_CONTROLLERS
 from orchestrator.core.errors import NOT_MET, CosimError, InputError
 from orchestrator.face.cli.arguments import (
@@ -41,7 +43,11 @@ from orchestrator.studies.coordinated_design.one_point import design_controller
 from orchestrator.studies.coordinated_design.study import ALL, PointsDesignRequest
 from orchestrator.studies.pod_design.design import DesignRequest
 from orchestrator.studies.pod_design.sheet import first_screen, sheet
-from orchestrator.studies.pod_design.view import ControllerDesign, parameter_file_path
+from orchestrator.studies.pod_design.view import (
+    ControllerDesign,
+    parameter_file_path,
+    parameters_of_less_gain,
+)
 from orchestrator.studies.points.store import PointStore, any_kept
 
 
@@ -123,7 +129,7 @@ def run(options: argparse.Namespace) -> int:
         print_json(controller.as_json(path) | {"made": made_now()})
         return ends
     console = make_console(names=design.prepared.names)
-    print_parts(console, first_screen(design))
+    print_parts(console, first_screen(design, _command_with_less_gain(options, controller)))
     print_stability(
         console,
         {
@@ -148,21 +154,41 @@ def run(options: argparse.Namespace) -> int:
     return ends
 
 
+def _command_with_less_gain(options: argparse.Namespace, controller: ControllerDesign) -> str:
+    """The command that shows the modes with the setting that has more damping with less gain."""
+    setting = parameters_of_less_gain(controller.result)
+    return _command(options, controller, {**_values_beside(options, setting), **setting})
+
+
 def _command_with(options: argparse.Namespace, controller: ControllerDesign, path: Path) -> str:
     """The command that shows the modes of the system that was designed for, with the setting.
 
     It has the values and files that the design was given. A value of ``--set`` that is one of the setting's is left
     out, and where a pattern would replace one, the setting's value stands behind it."""
-    given = {k: v for k, v in values_set(options).items() if k not in controller.parameters}
+    given = _values_beside(options, controller.parameters)
     replaced = {
         name: value
         for name, value in controller.parameters.items()
         if any(fnmatchcase(name, pattern) or fnmatchcase(pattern, name) for pattern in given)
     }
+    return _command(options, controller, given | replaced, path)
+
+
+def _values_beside(options: argparse.Namespace, setting: Mapping[str, Value]) -> dict[str, Value]:
+    """The values of ``--set`` that are none of a setting's."""
+    return {k: v for k, v in values_set(options).items() if k not in setting}
+
+
+def _command(
+    options: argparse.Namespace,
+    controller: ControllerDesign,
+    values: Mapping[str, Value],
+    *files: Path,
+) -> str:
     words = ["gfor", "modes", options.case, "--scenario", controller.result.target.scenario]
-    for name, value in (given | replaced).items():
+    for name, value in values.items():
         words += ["--set", f"{name}={str(value).lower() if isinstance(value, bool) else value}"]
-    for file in (*options.parameters, path):
+    for file in (*options.parameters, *files):
         words += ["--parameters", str(file)]
     words += [] if options.step is None else ["--step", repr(options.step)]
     words += ["--trust-fmus"] if options.trust_fmus else []

@@ -173,6 +173,8 @@ class PodDesign:
     final: Placed
     before: Surroundings
     after: Surroundings
+    # the setting of the first sensitivity, ΔK without lead/lag, where it has more damping with less gain; else None
+    less_gain: Placed | None
     # the prohibited effect of the final setting on other modes; empty if there is no such effect
     broken: str | None
     margins: Margins | None
@@ -419,6 +421,7 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
         refinement=choice.refinement,
         other_gain=choice.other_gain,
         final=final,
+        less_gain=None if choice.refinement else _less_gain(judge, final),
         before=before,
         after=choice.after,
         broken=choice.broken or _unstable(examined.stability, growth),
@@ -532,6 +535,22 @@ def _choose(
     if there.damping > now.damping + _MET and not (there.broken and not now.broken):
         return _Choice(other, judge.around(other), there.broken, other_gain=other)
     return replace(choice, other_gain=other)
+
+
+def _less_gain(judge: _Judge, final: Placed) -> Placed | None:
+    """The setting of the first sensitivity, where it has more damping with less gain than the final one, is stable, and
+    leaves the other modes no worse."""
+    start, gain = judge.start, judge.start.request.delta_gain
+    if gain >= final.setting.gain:
+        return None
+    bare = judge.loop.place(start.off, gain)
+    there, now = judge.judgement(bare), judge.judgement(final)
+    if there.least is None or now.least is None:
+        return None
+    better = there.damping > now.damping + _MET and there.least >= now.least - _MET
+    if not better or there.broken or not judge.loop.examine(bare.setting).stability.stable:
+        return None
+    return bare
 
 
 def _refined(

@@ -50,8 +50,13 @@ def sheet(d: PodDesign) -> Iterable[Table | str]:
     )
 
 
-def first_screen(d: PodDesign) -> Iterable[Table | str]:
+def first_screen(d: PodDesign, command: str) -> Iterable[Table | str]:
+    """Yield the answer and the modes.
+
+    ``command``: what shows the modes with `PodDesign.less_gain`."""
     yield f"[bold {'green' if d.met else 'red'}]{'met' if d.met else 'not met'}[/]: {escape(verdict(d))}"
+    if d.less_gain is not None:
+        yield escape(f"{_of_less_gain(d)}: {command}")
     table = _table("", "", f"Mode {d.mode_name}", "Least damped, 0.1 to 2 Hz", "Next", "Stable")
     for title, around, target, stability in (
         ("as it is, the controller off", d.before, d.initial, d.stability_before),
@@ -87,7 +92,11 @@ def _steps(d: PodDesign) -> Iterable[tuple[str, str, str]]:
         "as asked for" if d.request.damping is not None else f"ζ₀ + {percent(d.request.increment)}"
     )
     yield "Required damping", asked, f"ζ_d = {percent(d.required_damping)}"
-    yield "Mode aimed at", "λ_d = −ζ_d·ω₀ ± jω₀", mode_text(d.predicted)
+    yield (
+        "Mode aimed at",
+        "λ_d = −ζ_d·ω₀ ± jω₀",
+        f"{mode_text(d.predicted)}: σ is ζ_d of ω₀, not of |λ|",
+    )
     yield (
         (f"Mode with K = ΔK = {K} pu", "λ_NC (the device's own lead/lag)", mode_text(S.mode))
         if d.target.has_gain_alone
@@ -227,7 +236,17 @@ def verdict(d: PodDesign) -> str:
 
 def remarks(d: PodDesign) -> list[str]:
     """Return the verdict without the target's damping and the margin, which a report has as figures."""
-    return [*_of_the_modes(d), *_of_the_bounds(d)]
+    less = [] if d.less_gain is None else [_of_less_gain(d)]
+    return [*_of_the_modes(d), *_of_the_bounds(d), *less]
+
+
+def _of_less_gain(d: PodDesign) -> str:
+    assert d.less_gain is not None
+    lead = "" if d.target.has_gain_alone else " without lead/lag"
+    return (
+        f"less gain has more damping: K = {d.less_gain.setting.gain:.4g} pu{lead}, where the sensitivity was taken, "
+        f"gives the target {percent(d.less_gain.damping_ratio)}, and the least damped mode of all has no less either"
+    )
 
 
 def _of_the_modes(d: PodDesign) -> Iterable[str]:

@@ -163,6 +163,7 @@ def design_json(d: PodDesign) -> dict[str, Any]:
             "delta_gain": d.request.delta_gain,
             "least_damping_of_others": d.request.least_damping,
         },
+        "less_gain": _less_gain_json(d),
         "met": d.met,
         "verdict": verdict(d),
         "remarks": remarks(d),
@@ -202,6 +203,27 @@ def parameters_of(d: PodDesign) -> dict[str, bool | float | str]:
     return d.final.setting.parameters(
         target.key, d.request.controller, target.stages, target.neutral
     )
+
+
+def parameters_of_less_gain(d: PodDesign) -> dict[str, bool | float | str]:
+    """Return the setting of `PodDesign.less_gain` by ``component.variable``; {} where there is none."""
+    target = d.target
+    if d.less_gain is None:
+        return {}
+    return d.less_gain.setting.parameters(
+        target.key, d.request.controller, target.stages, target.neutral
+    )
+
+
+def _less_gain_json(d: PodDesign) -> dict[str, Any] | None:
+    if d.less_gain is None:
+        return None
+    return {
+        "K": d.less_gain.setting.gain,
+        "mode": _complex(d.less_gain.eigenvalue),
+        "damping_ratio": d.less_gain.damping_ratio,
+        "parameters": parameters_of_less_gain(d),
+    }
 
 
 def provenance(d: PodDesign, command: str) -> list[str]:

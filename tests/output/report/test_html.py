@@ -84,6 +84,11 @@ def test_the_page_needs_nothing_but_itself(page):
     assert "0.2020" in text  # T_S1
     for margin in ("Gain, upwards", "Phase", "Delay"):
         assert f">{margin}</" in text
+    for at in ("84.8° at 0.753 Hz", "49.0 ms at 5.88 Hz", "of the gain: no eigenvalue unstable"):
+        assert at in text
+    assert "to 20.59 % of the mode's frequency in rad/s, which is 20.17 % of damping" in (
+        text.replace("&#x27;", "'")
+    )
     assert 'name = "two_area"' in text.replace("&quot;", '"')
 
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -103,6 +104,25 @@ def test_the_parameter_file_says_where_it_comes_from(design, tmp_path):
 def test_a_pattern_that_fits_is_kept_in_the_parameter_file(design, tmp_path):
     design("--controller", "pod_q", "--component", "gfor*")
     assert '"gfor*.pod_q.K" = 200.0' in (tmp_path / "two_area_pod_q.toml").read_text()
+
+
+def test_less_gain_with_more_damping_is_told_with_the_command_for_it(gfor, design):
+    """The paper's bounds take K = 200 pu with a lag; 50 without one, tried on the way, damp by half as much again."""
+    out = design("--controller", "pod_p").splitlines()[:3]
+    (line,) = [text for text in out if text.startswith("less gain has more damping: K = 50 pu ")]
+    assert "gives the target 36.17 %" in line
+    words = shlex.split(line.partition(": gfor ")[2])
+    code, said, _ = gfor(*words, "--json")
+    (scenario,) = json.loads(said)["scenarios"]
+    assert code == 0
+    assert scenario["stability"]["stable"]
+    least = min(scenario["modes"], key=lambda mode: mode["damping_percent"])
+    assert (least["name"], round(least["damping_percent"], 2)) == ("electromechanical", 36.17)
+
+
+def test_less_gain_is_not_told_where_more_was_tried(design):
+    found = json.loads(design("--controller", "pod_p", "--delta-gain", "250", "--json"))
+    assert found["less_gain"] is None
 
 
 def test_the_sheet_shows_formulas_figures_and_units(design):

@@ -256,7 +256,18 @@ def design(sheet: dict[str, Any]) -> str:
         f"{number(sensitivity['phase_deg'], 1)}°{needed}.</p>"
         + table("Setting", ["Parameter", "Value"], settings)
         + table("Modes", ["Mode", "λ [rad/s]", "f [Hz]", "Damping [%]"], rows)
+        + _aimed_at(sheet)
         + _margins(sheet.get("margins") or {})
+    )
+
+
+def _aimed_at(sheet: Mapping[str, Any]) -> str:
+    """Say why the predicted mode has less damping than is required."""
+    required, aimed = sheet["requirement"]["damping_ratio"], sheet["predicted_mode"]
+    has = -aimed["real"] / np.hypot(aimed["real"], aimed["imag"])
+    return (
+        f"<p>The equations shift the real part alone, to {100 * required:.2f} % of the mode's frequency in rad/s, "
+        f"which is {100 * has:.2f} % of damping; the frequency moves as well in the closed loop.</p>"
     )
 
 
@@ -271,7 +282,14 @@ def _margins(margins: dict[str, Any]) -> str:
         ],
         ["Gain, downwards", "down to 0" if down is None else f"× {down:.3g}"],
     ]
-    for name, key, unit in (("Phase", "phase_margin_deg", "°"), ("Delay", "delay_margin_s", "s")):
+    for name, key, times, unit in (
+        ("Phase", "phase_margin_deg", 1.0, "°"),
+        ("Delay", "delay_margin_s", 1e3, " ms"),
+    ):
         if margins.get(key) is not None:
-            rows.append([name, f"{margins[key]:.3g} {unit}"])
-    return table("Margins", ["Of the POD loop", "until a mode is lost"], rows)
+            at = margins.get(f"{key.rpartition('_')[0]}_hz")
+            there = "" if at is None else f" at {at:.3g} Hz"
+            rows.append([name, f"{times * margins[key]:.1f}{unit}{there}"])
+    limit = f"no eigenvalue unstable, no mode from 0.1 to 2 Hz below {100 * margins['damping_limit']:.2f} %"
+    caption = f"Margins; of the gain: {limit}"
+    return table(caption, ["Of the POD loop", "Value"], rows)
