@@ -30,7 +30,7 @@ from orchestrator.studies.validation.parameters import NEVER
 from orchestrator.studies.validation.plant_out_of_step import plant_loss
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.record import PortBases, Recording, questions_of_level
-from orchestrator.studies.validation.setpoint import ask_of_setpoint
+from orchestrator.studies.validation.setpoint import ask_of_setpoint, without_step
 from orchestrator.studies.validation.windows import Windows, find_windows
 
 _SHORTEST_BEFORE = 0.1  # a window before the event [s] that shows a steady state
@@ -395,10 +395,14 @@ def in_step(comparison: EventComparison) -> EventComparison:
 
 
 def before_setpoint(comparison: EventComparison) -> RecordedEvent:
-    """The event up to where a setpoint changed, of which no cause is told; the whole event where none did."""
+    """The event up to where a setpoint changed, of which no cause is told; the whole event where none did.
+
+    Without the step, where it changed within the event, as nothing of that is before it."""
     event = comparison.event
     for one in comparison.questions:
         if one.kind is QuestionKind.SETPOINT:
+            if one.figures.get("within"):
+                return replace(event, recording=without_step(event.recording, one))
             stop = float(one.figures["stop"]) - event.recording.begin
             return cut_event(event, stop - event.windows.begin)
     return event

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,6 +24,10 @@ _SHORTEST_RAMP = 0.2  # [s]
 _BEFORE_RAMP = 0.3  # time [s] for which the model is seen to be right before a ramp
 _RIGHT_BEFORE = 0.15  # part of a ramp by which the model may be off before it
 _STRAIGHT = 0.06  # part of a ramp by which the error may be off its straight lines (rms)
+_SETTLED = (
+    0.5  # time [s] after an event, from which on a setpoint that changed in it has moved P or Q
+)
+_CONSTANT = 0.02  # part of an offset by which the error may be off it (rms of means over some time)
 _WORSE = 3.0  # times that, by which the voltage is worse at explaining it
 
 
@@ -36,7 +41,60 @@ def ask_of_setpoint(recording: Recording, windows: Windows, simulated: Complex) 
     found = []
     for name, values in (("p", error.real), ("q", error.imag)):
         found += [*_steps(recording, name, values, first), *_ramps(recording, name, values, first)]
+    found = found or [
+        *_within_event(recording, windows, "p", error.real),
+        *_within_event(recording, windows, "q", error.imag),
+    ]
     return found[:1]
+
+
+def without_step(recording: Recording, question: Question) -> Recording:
+    """A recording without the step of P or Q that is asked about."""
+    figures = question.figures
+    moved = recording.times + recording.begin >= figures["at"] - recording.interval / 2
+    axis = 1.0 if figures["signal"] == "p" else 1j
+    power = recording.power - figures["offset"] * axis * moved
+    return replace(recording, power=np.asarray(power))
+
+
+def _within_event(
+    recording: Recording, windows: Windows, name: str, values: Numbers
+) -> Iterator[Question]:
+    """An error that is none before the event, and the same from then on, whatever frequency and voltage do.
+
+    A droop or a gain that is wrong moves with them. Figure ``within``: no part after it is without the step."""
+    times, good = recording.times, recording.good
+    before, after = good & (times < windows.begin), good & (times > windows.end + _SETTLED)
+    if times[-1] - windows.end - _SETTLED < _SHORTEST_AFTER or not before.any():
+        return
+    level, offset = float(values[before].mean()), float(values[after].mean())
+    if abs(offset) < _OFFSET or abs(level) > _RIGHT_BEFORE * abs(offset):
+        return
+    count = max(1, round(_WITHIN / recording.interval))
+    magnitude, angle = np.abs(recording.voltage), np.unwrap(np.angle(recording.voltage))
+    error, *columns = (
+        _means(one[after], count)
+        for one in (
+            values,
+            magnitude - magnitude[before].mean(),
+            np.gradient(angle),
+            angle - angle[before].mean(),
+        )
+    )
+    rest = float(np.std(error))
+    beside = _error_beside(np.column_stack(columns), error)
+    if rest > _CONSTANT * abs(offset) or beside < _WORSE * rest:
+        return
+    begin = int(np.searchsorted(times, windows.begin))
+    stop = int(np.searchsorted(times, windows.end + _SETTLED))
+    part = values[begin:stop]
+    costs = [
+        float(part[:k] @ part[:k] + np.sum((part[k:] - offset) ** 2)) for k in range(len(part))
+    ]
+    at = recording.begin + float(times[begin + int(np.argmin(costs))])
+    yield Question(
+        QuestionKind.SETPOINT, {"signal": name, "offset": -offset, "at": at, "within": True}
+    )
 
 
 def _steps(recording: Recording, name: str, values: Numbers, first: int) -> Iterator[Question]:

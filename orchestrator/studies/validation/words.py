@@ -317,6 +317,11 @@ def _meter_elsewhere(x: Figures) -> str:
 
 def _setpoint(x: Figures) -> str:
     name = x["signal"].upper()
+    if x.get("within"):
+        return (
+            f"from {x['at']:.4g} s on {name} is {x['offset']:+.3g} pu off the model's and stays so, whatever frequency "
+            "and voltage do: did a setpoint change during the event? " + _without_step(x)
+        )
     if x.get("drifts"):
         return (
             f"from {x['at']:.4g} to {x['until']:.4g} s {name} leaves the model's along a straight line, by "
@@ -333,6 +338,12 @@ def _setpoint(x: Figures) -> str:
         f"at {x['at']:.4g} s {name} leaves the model's by {x['offset']:+.3g} pu and stays, and the "
         "voltage does nothing then: did a setpoint change? " + _before_setpoint(x)
     )
+
+
+def _without_step(x: Figures) -> str:
+    if x.get("tried"):
+        return "No cause that was tried explains it; causes are those of the rest, without the step"
+    return f"Type {Option.EXPLAIN}: it tries what else explains it, and looks at the rest without the step"
 
 
 def _before_setpoint(x: Figures) -> str:

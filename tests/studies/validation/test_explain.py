@@ -205,6 +205,22 @@ def test_no_cause_is_read_from_what_follows_a_setpoint_that_changed():
 
 
 @pytest.mark.slow
+def test_a_setpoint_that_changes_within_the_event_is_no_gain():
+    """A right model: a gain explained most of the step, and was named."""
+    frame = with_noise(table(run("pod_p", stop=4.0))).iloc[::20]
+    moved = frame.assign(p_mw=frame.p_mw + 68 * (frame.time > 1.05)).set_index("time")
+    found = gfor_in_python.validate("gfor", moved, values=ON, explain=True)
+    (question,) = [
+        one for one in found.as_json()["events"][0]["questions"] if one["kind"] == "setpoint"
+    ]
+    assert question["figures"]["offset"] == pytest.approx(68 / 1500, rel=0.02)
+    assert question["figures"]["at"] == pytest.approx(1.05, abs=0.03)
+    assert "No cause that was tried explains it" in question["text"]
+    assert all(one.error < 0.01 for one in found.result.explanations)  # 0.04 with the step
+    assert "pod_p.K" not in [one.name for one in found.result.explanations if one.explains]
+
+
+@pytest.mark.slow
 def test_a_pod_that_is_off_in_the_plant_is_named_as_a_switch_and_no_setpoint_is_asked_about():
     """From 50 samples a second a model with the POD on leaves for good, as if a setpoint had changed."""
     slow = with_noise(table(run("pod_p", stop=4.0, gfor__pod_p__enabled=False))).iloc[::20]

@@ -239,6 +239,10 @@ PLANTED = {
     "the times are in minutes": (lambda f: f.assign(time=f.time / 60), "time unit"),
     "a setpoint ramps": (of_ramp, "setpoint"),
     "setpoint": (lambda f: f.assign(p_mw=f.p_mw + 100 * (f.time > 2)), "setpoint"),
+    "setpoint within the event": (
+        lambda f: f.assign(p_mw=f.p_mw + 68 * (f.time > 1.05)),
+        "setpoint",
+    ),
 }
 
 
