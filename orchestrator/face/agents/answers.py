@@ -16,7 +16,7 @@ class ModeAnswer(BaseModel):
     real: float = Field(description="Re λ [1/s]")
     imag: float = Field(description="Im λ [rad/s]")
     participation: Part = Field(
-        description="state: magnitude of its participation factor; the largest first"
+        description="state: magnitude of its participation factor; the five largest, the largest first"
     )
     shape: dict[str, tuple[float, float]] = Field(
         description="machine: magnitude and angle [deg] of its speed in the right eigenvector, the largest at 1 and 0"
@@ -38,7 +38,12 @@ class ModesAnswer(BaseModel):
     """Modes of a case's scenarios, from its coupled FMUs linearised around their steady state."""
 
     case: str
-    scenarios: list[ScenarioModesAnswer]
+    scenarios: list[ScenarioModesAnswer] = Field(
+        description="the one that was asked for, else the case's first"
+    )
+    others: dict[str, str] = Field(
+        description="scenario: its verdict; ask for it by name to get its modes"
+    )
     questions: list[str] = Field(
         description="what in the input deserves a look before the figures are believed"
     )

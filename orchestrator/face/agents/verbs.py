@@ -44,6 +44,12 @@ VERBS = (
 MOST_ROWS = 20
 """Modes, buses, parameters or states that an answer lists: more than a reader compares, and few enough for an agent."""
 
+MOST_PARTS = 5
+"""States that take part in a mode, which `modes` lists: what follows is small."""
+
+DIGITS = 6
+"""Significant digits of a mode's figures: more than a model is right to, and a third of the characters."""
+
 MOST_DECIDING = 3
 """Growing modes that an explanation names, the least damped first."""
 
@@ -85,12 +91,15 @@ class Verbs:
     ) -> ModesAnswer:
         """Compute modes of a case: frequency, damping, participation factors and mode shape, each with its own mode.
 
-        ``values`` sets parameters first, such as {"grid.X_L": 0.3}.
+        ``values`` sets parameters first, such as {"grid.X_L": 0.3}. Without ``scenario`` the modes are those of the
+        case's first one; the others are named with their verdicts.
         """
         found = self._ask("modes", case, scenario, values)
+        first, *others = found["scenarios"]
         return ModesAnswer(
             case=found["case"],
-            scenarios=[_scenario_modes(one) for one in found["scenarios"]],
+            scenarios=[_scenario_modes(first)],
+            others={one["name"]: one["stability"]["sentence"] for one in others},
             questions=_first(found["questions"]),
         )
 
@@ -279,9 +288,13 @@ def _title(path: Path) -> str:
     return ""
 
 
-def _largest(parts: Mapping[str, float]) -> dict[str, float]:
+def _largest(parts: Mapping[str, float], most: int = MOST_ROWS) -> dict[str, float]:
     ordered = sorted(parts.items(), key=lambda part: part[1], reverse=True)
-    return dict(ordered[:MOST_ROWS])
+    return dict(ordered[:most])
+
+
+def _rounded(figure: float) -> float:
+    return float(f"{figure:.{DIGITS}g}")
 
 
 def _scenario_modes(one: Mapping[str, Any]) -> ScenarioModesAnswer:
@@ -297,13 +310,14 @@ def _scenario_modes(one: Mapping[str, Any]) -> ScenarioModesAnswer:
 
 
 def _mode(mode: Mapping[str, Any]) -> ModeAnswer:
+    parts = {row["state"]: _rounded(row["factor"]) for row in mode["participation"]}
     return ModeAnswer(
         name=mode["name"],
-        frequency_hz=mode["frequency_hz"],
-        damping_percent=mode["damping_percent"],
-        real=mode["real"],
-        imag=mode["imag"],
-        participation=_largest({row["state"]: row["factor"] for row in mode["participation"]}),
+        frequency_hz=_rounded(mode["frequency_hz"]),
+        damping_percent=_rounded(mode["damping_percent"]),
+        real=_rounded(mode["real"]),
+        imag=_rounded(mode["imag"]),
+        participation=_largest(parts, MOST_PARTS),
         shape=_shape(mode["shape"]),
     )
 
@@ -311,15 +325,13 @@ def _mode(mode: Mapping[str, Any]) -> ModeAnswer:
 def _shape(rows: Iterable[Mapping[str, Any]]) -> dict[str, tuple[float, float]]:
     """Return speeds of machines relative to the largest one: magnitude, and angle [deg] within ±180."""
     speeds = [row for row in rows if row["state"].endswith("machine.omega")]
-    if not speeds:
-        return {}
-    largest = max(speeds, key=lambda row: float(row["magnitude"]))
+    ordered = sorted(speeds, key=lambda row: float(row["magnitude"]), reverse=True)
     return {
         row["state"].partition(".")[0]: (
-            row["magnitude"] / largest["magnitude"],
-            (row["angle_deg"] - largest["angle_deg"] + 180) % 360 - 180,
+            _rounded(row["magnitude"] / ordered[0]["magnitude"]),
+            _rounded((row["angle_deg"] - ordered[0]["angle_deg"] + 180) % 360 - 180),
         )
-        for row in speeds
+        for row in ordered[:MOST_ROWS]
     }
 
 
