@@ -33,6 +33,20 @@ def bus_of_largest_load(loads: Sequence[Load], buses: Sequence[str]) -> str:
     return largest.bus if largest else buses[0]
 
 
+def _dispatch(place: ConverterPlace) -> str:
+    """Return which unit feeds less or more with a converter, and by how much."""
+    p_mw, slack = place.wanted.p_mw, f"the slack ({place.slack})"
+    before = f"{place.before_mw:.5g}"
+    if place.wanted.replaces:
+        return f"{place.less} is gone ({before} MW before); {slack} feeds the difference"
+    if not p_mw:
+        return "it feeds 0 MW, so no MW moves: the Mvar that this voltage takes alone do"
+    change = f"{abs(p_mw):g} MW {'less' if p_mw > 0 else 'more'}"
+    if place.less:
+        return f"{place.less} feeds {change} ({before} before), with its rating and inertia"
+    return f"{slack} feeds {change}"
+
+
 class CaseText:
     """The text of a case, without and with what the network's first power flow says."""
 
@@ -64,17 +78,11 @@ class CaseText:
     def assumed(self, questions: int) -> list[str]:
         lines, device = [], self._wanted.device
         for p in self._places:
-            w = p.wanted
-            dispatch = f"the slack ({p.slack}) feeds {w.p_mw:g} MW less"
-            if w.replaces:
-                dispatch = f"{p.less} is gone ({p.before_mw:.5g} MW before); the slack ({p.slack}) feeds the difference"
-            elif p.less:
-                dispatch = f"{p.less} feeds {w.p_mw:g} MW less ({p.before_mw:.5g} before), with its rating and inertia"
             ours = "ours, with the POD gains of the paper's system (`gfor design` finds others)"
             what = ours if device is None else device.name
             called = "converter" if len(self._places) == 1 else p.name
             holding = f"at {p.bus} it holds the {p.v_pu:g} pu of the base"
-            lines.append(f"{called}: {what}; {holding}; {dispatch}")
+            lines.append(f"{called}: {what}; {holding}; {_dispatch(p)}")
         if "dyr" not in self._sources:
             lines.append(
                 "machines: no dynamics data, so all are a steam turbine's with exciter ST1: typical data"

@@ -352,6 +352,18 @@ def test_the_slack_needs_no_new_power(files):
     assert case.scenarios["converter"].set == {}
 
 
+@pytest.mark.parametrize("less", ["", ", less sg3"])
+def test_a_converter_of_no_power_moves_none(files, less):
+    """Mvar alone move: machine and slack feed the MW of before."""
+    case, new = made(files, f"bus 13, 300 MVA, 0 MW{less}")
+    said = "".join(new.assumed)
+    assert "it feeds 0 MW, so no MW moves: the Mvar that this voltage takes alone do" in said
+    assert "0 MW less" not in said
+    before, after = (case.prepare([name])[0].power_flow.powers for name in ("base", "converter"))
+    for name in before:
+        assert after[name].real == pytest.approx(before[name].real, abs=1e-4)
+
+
 def test_a_converter_can_replace_a_machine(files):
     case, new = made(files, "bus 13, 200 MVA, 160 MW, instead of sg3")
     assert "sg3 is gone (160 MW before)" in "".join(new.assumed)
