@@ -195,21 +195,30 @@ class _Solver:
                 source=source,
             )
         )
-        if seen is None and kind != "open pole":
-            lacks = "zero" if negative is not None else "negative"
-            remedy = (
-                "say which neutrals are earthed, such as [network.sequences] "
-                f"{_EXAMPLES['step_up']} or machine_x0 = 0.1"
-                if lacks == "zero"
-                else "a machine or a load there gives it one"
+        if kind != "open pole" and (seen is None or (kind == "2-phase-earth" and zero is None)):
+            self._ask_of_paths(place, kind, negative, seen)
+
+    def _ask_of_paths(
+        self, place: str, kind: str, negative: complex | None, seen: complex | None
+    ) -> None:
+        """Ask about a sequence without a path to earth from a fault's place."""
+        lacks = "zero" if negative is not None else "negative"
+        remedy = (
+            "say which neutrals are earthed, such as [network.sequences] "
+            f"{_EXAMPLES['step_up']} or machine_x0 = 0.1"
+            if lacks == "zero"
+            else "a machine or a load there gives it one"
+        )
+        effect = f"a fault of kind {kind} draws no current there, and the run shows none"
+        if seen is not None:
+            effect = (
+                f"a fault of kind {kind} is one of kind 2-phase there, without the impedance of the way to earth: the "
+                "positive sequence meets Z2 alone"
             )
-            text = (
-                f"no path of the {lacks} sequence leads to earth from {place}: a fault of kind {kind} draws no current "
-                f"there, and the run shows none; {remedy}"
-            )
-            self._asked.append(
-                Problem(self._where, text, topic=QuestionTopic("a fault without a path"))
-            )
+        text = f"no path of the {lacks} sequence leads to earth from {place}: {effect}; {remedy}"
+        self._asked.append(
+            Problem(self._where, text, topic=QuestionTopic("a fault without a path"))
+        )
 
     def questions(self) -> Iterator[Problem]:
         """Yield what was taken by a default, a question for each key that says otherwise, and what draws no current."""

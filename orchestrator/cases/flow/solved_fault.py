@@ -23,6 +23,8 @@ class SolvedFault:
         met = "the positive sequence meets an open circuit: no current flows there"
         if self.seen is not None:
             met = f"the positive sequence meets {_text_of(self.seen)} pu on 100 MVA"
+            if self.kind == "2-phase-earth" and self.zero is None:
+                met += ", as at two phases without earth"
         when = f"{self.kind} at {self.place}, t = {self.time:g} s"
         return f"{when}: Z2 = {_text_of(self.negative)}{zero} ({self.source}); {met}"
 

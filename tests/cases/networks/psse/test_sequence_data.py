@@ -231,8 +231,21 @@ def test_no_path_to_earth_means_no_current_and_is_told(prepared):
     assert "draws no current there" in text
     assert "Z0 = no path" in found.in_words
     assert found.in_words.endswith("meets an open circuit: no current flows there")
-    both = prepared(fault='bus = "bus_2"\nkind = "2-phase-earth"').faults[0]
-    assert both.seen == both.negative
+
+
+def test_two_phases_to_earth_without_a_path_are_two_phases_and_it_is_told(prepared):
+    ready = prepared(fault='bus = "bus_2"\nkind = "2-phase-earth"')
+    (found,) = ready.faults
+    assert found.seen == found.negative
+    (text,) = told(ready, "no path of the zero sequence leads to earth from bus_2")
+    assert "a fault of kind 2-phase-earth is one of kind 2-phase there" in text
+    assert "the positive sequence meets Z2 alone" in text
+    assert "[network.sequences] step_up" in text
+    assert found.in_words.endswith("pu on 100 MVA, as at two phases without earth")
+    with_path = prepared(fault='bus = "bus_5"\nkind = "2-phase-earth"')
+    assert not told(with_path, "no path of the zero sequence")
+    assert with_path.faults[0].in_words.endswith("pu on 100 MVA")
+    assert not told(prepared(fault='bus = "bus_2"\nkind = "2-phase"'), "no path of the zero")
 
 
 def test_ratios_of_the_case_are_no_questions(prepared):
