@@ -41,7 +41,7 @@ _LOSSES = 3  # of code CZ0
 _OHMS = 3  # of code CZG
 _SHOWN = 4  # records that a question names
 _USUAL_LINES = (0.8, 8.0)
-"""Middle ratio of Z0 to Z1 of lines outside of which the base is asked about."""
+"""Ratio of Z0 to Z1 of a line outside of which it is asked about, and the base where the middle one of all is."""
 _USUAL_MACHINES = (0.4, 2.5)  # the same of X2 to X''d of machines
 
 _UNUSED = {
@@ -68,6 +68,16 @@ class CaseElements:
     numbers: frozenset[int]
 
 
+@dataclass(frozen=True, slots=True)
+class _Ratio:
+    """Z0 by Z1 of a line, or X2 by X'' of a machine: its record, its name, and the figures in words."""
+
+    record: Record
+    name: str
+    value: float
+    figures: str
+
+
 @dataclass
 class SequenceReading:
     """Elements with the data of a file, the file's records, and what is to be asked."""
@@ -91,10 +101,15 @@ class SequenceReading:
         self._units = {
             key: f"sg{label}" for key, label in unit_labels(self.elements.machines).items()
         }
+        self._sources = {
+            self._units[m.bus, m.name.strip()]: m.source.imag for m in self.elements.machines
+        }
         self._foreign: list[str] = []
+        self._ratios_of_lines: list[_Ratio] = []
+        self._ratios_of_machines: list[_Ratio] = []
         self._read_all()
         self._ask_of_foreign()
-        self._ask_of_bases()
+        self._ask_of_ratios()
 
     @property
     def data(self) -> SequenceData:
@@ -176,7 +191,31 @@ class SequenceReading:
         for name in names:
             one, other = ends if self._key(name).buses == tuple(buses) else ends[::-1]
             self.lines[name] = ZeroLine(z * self._on_100, charging, one, other)
+        self._compare_line(record, names[0], z)
         return ""
+
+    def _compare_line(self, record: Record, name: str, z: complex) -> None:
+        """Keep a line's Z0 by Z1, and ask about signs that differ from those of Z1.
+
+        ``z``: Z0 [pu of the file]."""
+        known = self.elements.lines.get(name)
+        if known is None:
+            return
+        first = complex(known.R, known.X) / self._on_100
+        turned = [
+            f"{field} = {zero:g} pu, where {symbol} is {own:.4g}"
+            for field, zero, symbol, own in (
+                ("XLINZ", z.imag, "X1", first.imag),
+                ("RLINZ", z.real, "R1", first.real),
+            )
+            if zero * own < 0 or (zero < 0 and not own)
+        ]
+        if turned:
+            text = f"{name} has {', and '.join(turned)}: used as it stands; is its sign wrong?"
+            self._ask(record, text, "the sign of a line's Z0")
+            return
+        figures = f"RLINZ + jXLINZ = {z.real:g}{z.imag:+g}j pu, R1 + jX1 = {first.real:.4g}{first.imag:+.4g}j pu"
+        self._ratios_of_lines.append(_Ratio(record, name, abs(z) / abs(first), figures))
 
     def _key(self, name: str) -> BranchKey:
         return self.elements.keys[name]
@@ -236,6 +275,10 @@ class SequenceReading:
                 record, "CZG is not 1: ZRG and ZXG are taken in pu of MBASE", "CZG of a machine"
             )
         self.machines[name] = MachineSequences(negative, zero + 3 * earthing if zero else None)
+        columns = {"X2": (7, "ZXNEGDV"), "X0": (9, "ZX0DV"), "R2": (6, "ZRNEG"), "R0": (8, "ZR0")}
+        self._compare_machine(
+            record, name, columns | {"RG": (11, "ZRG"), "XG": (12, "ZXG")} if zero else columns
+        )
         return "" if negative or zero else "its impedances are 0, which means none"
 
     def _old_machine(self, record: Record, *, zero: bool) -> str:
@@ -248,7 +291,29 @@ class SequenceReading:
         self.machines[name] = MachineSequences(
             before.negative if zero else z, (z or None) if zero else before.zero
         )
+        kind = "0" if zero else "2"
+        self._compare_machine(record, name, {f"X{kind}": (3, "ZX"), f"R{kind}": (2, "ZR")})
         return "" if z else "its impedance is 0, which means none"
+
+    def _compare_machine(
+        self, record: Record, name: str, columns: Mapping[str, tuple[int, str]]
+    ) -> None:
+        """Keep a machine's X2 by X'', and ask about negative values.
+
+        ``columns``: of impedances and the fields' names, by their symbols."""
+        values = {symbol: record.number(*column, 0.0) for symbol, column in columns.items()}
+        negative = [
+            f"{symbol} = {value:g} pu ({columns[symbol][1]})"
+            for symbol, value in values.items()
+            if value < 0
+        ]
+        if negative:
+            text = f"{name} has {', '.join(negative)}, where a machine's exceed 0: used so; is its sign wrong?"
+            self._ask(record, text, "a negative impedance of a machine")
+        source, x = self._sources.get(name, 0.0), values.get("X2", 0.0)
+        if source > 0 and x > 0:
+            figures = f"X2 = {x:g} pu, ZX of RAW = {source:g} pu"
+            self._ratios_of_machines.append(_Ratio(record, name, x / source, figures))
 
     def _unit(self, record: Record) -> str | None:
         bus = record.whole(0, "the bus' number")
@@ -313,34 +378,29 @@ class SequenceReading:
         topic = QuestionTopic("sequence data of buses that do not exist")
         self.questions.append(Problem(self.file.place, text, topic=topic))
 
-    def _ask_of_bases(self) -> None:
-        """Ask about a base where the middle of all ratios is no ratio that equipment has."""
-        known = self.elements.lines
-        ratios = [
-            abs(zero.z) / abs(complex(known[name].R, known[name].X))
-            for name, zero in self.lines.items()
-            if name in known
-        ]
-        sources = {
-            self._units[m.bus, m.name.strip()]: m.source.imag for m in self.elements.machines
-        }
-        machines = [
-            x.negative.imag / sources[name]
-            for name, x in self.machines.items()
-            if sources.get(name) and x.negative
-        ]
+    def _ask_of_ratios(self) -> None:
+        """Ask about a base where the middle of all ratios is no ratio that equipment has, else about single ratios."""
+        base = f"the base of the network's file, {self.elements.base_mva:g} MVA"
         asked = (
-            ("Z0 by Z1 of lines", ratios, _USUAL_LINES),
-            ("X2 by X'' of machines (ZX of RAW)", machines, _USUAL_MACHINES),
+            ("Z0 by Z1", "lines", self._ratios_of_lines, _USUAL_LINES, base),
+            (
+                *("X2 by X''", "machines (ZX of RAW)", self._ratios_of_machines, _USUAL_MACHINES),
+                "the machines' bases, MBASE",
+            ),
         )
-        for what, found, (low, high) in asked:
-            if found and not low <= median(found) <= high:
-                text = (
-                    f"{what} is {median(found):.3g} in the middle of all, where {low:g} to {high:g} are usual: are the "
-                    f"sequence data on the base of the network's file, {self.elements.base_mva:g} MVA?"
-                )
+        for ratio, of, found, (low, high), own in asked:
+            middle = median(x.value for x in found) if found else low
+            usual = f"where {low:g} to {high:g} are usual"
+            if not low <= middle <= high:
+                what = f"{ratio} of {of}"
+                text = f"{what} is {middle:.3g} in the middle of all, {usual}: are the sequence data on {own}?"
                 topic = QuestionTopic("the base of sequence data", what)
                 self.questions.append(Problem(self.file.place, text, topic=topic))
+                continue
+            for one in found:
+                if not low <= one.value <= high:
+                    text = f"{ratio} of {one.name} is {one.value:.3g}, {usual} ({one.figures}): is it meant?"
+                    self._ask(one.record, text, f"an unusual {ratio}")
 
 
 class _TransformerRecord:

@@ -218,7 +218,8 @@ def test_a_base_that_is_another_is_asked_about(prepared):
     lines = [(i, j, 100 * r, 100 * x, b) for i, j, r, x, b in LINES]
     assert told(prepared(seq(lines=lines)), "Z0 by Z1 of lines is 25")
     machines = [f"{n},'1 ',0,{REACTANCES[n]},0.3,1.0,0,{X2[n] / 10},0,0.05,1,0,0,0" for n in X2]
-    assert told(prepared(seq(machines=machines)), "X2 by X'' of machines (ZX of RAW) is 0.1")
+    (text,) = told(prepared(seq(machines=machines)), "X2 by X'' of machines (ZX of RAW) is 0.1")
+    assert "on the machines' bases, MBASE?" in text
 
 
 def test_no_path_to_earth_means_no_current_and_is_told(prepared):
@@ -231,6 +232,75 @@ def test_no_path_to_earth_means_no_current_and_is_told(prepared):
     assert "draws no current there" in text
     assert "Z0 = no path" in found.in_words
     assert found.in_words.endswith("meets an open circuit: no current flows there")
+
+
+def seq_with(change, text=None):
+    old, new = change
+    text = seq() if text is None else text
+    assert text.count(old) == 1
+    return text.replace(old, new)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            ("7,8,'1 ',0.034,0.18,", "7,8,'1 ',0.034,-0.18,"),
+            "has XLINZ = -0.18 pu, where X1 is 0.072: used as it stands; is its sign wrong?",
+        ),
+        (
+            ("7,8,'1 ',0.034,0.18,", "7,8,'1 ',-0.034,0.18,"),
+            "has RLINZ = -0.034 pu, where R1 is 0.0085: used as it stands",
+        ),
+        (
+            ("7,8,'1 ',0.034,0.18,", "7,8,'1 ',0.034,0.018,"),
+            "is 0.531, where 0.8 to 8 are usual (RLINZ + jXLINZ = 0.034+0.018j pu, R1 + jX1 = 0.0085+0.072j pu)",
+        ),
+        (("7,8,'1 ',0.034,0.18,", "7,8,'1 ',0.034,1.8,"), "is 24.8, where 0.8 to 8 are usual"),
+    ],
+)
+def test_one_lines_unusual_impedance_is_asked_about_at_its_record(change, words, prepared):
+    text = seq_with(change)
+    ready = prepared(text)
+    (asked,) = told(ready, words)
+    number = next(k for k, line in enumerate(text.splitlines(), 1) if line.startswith(change[1]))
+    assert f"line {number}:" in asked
+    assert "line_7_8" in asked
+    usual = prepared(seq())
+    assert ready.faults[0].zero != usual.faults[0].zero  # what is asked about is used
+    assert not told(usual, "are usual")
+    assert not told(usual, "sign wrong")
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_each_negative_impedance_of_a_machine_is_asked_about_by_name(count, prepared):
+    """However many of the machines have one: no median hides it, and no base is asked about."""
+    signs = {n: -1 if n > 3 - count else 1 for n in X2}
+    rows = [f"{n},'1 ',0,0.2,0.3,1.0,0,{signs[n] * X2[n]},0,0.05,1,0,0,0" for n in X2]
+    ready = prepared(seq(machines=rows))
+    found = told(ready, "sign wrong?")
+    assert len(found) == count
+    assert any("line 4: sg3 has X2 = -0.21 pu (ZXNEGDV)" in x for x in found)
+    assert not told(ready, "in the middle of all")
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        ("0,0.2,0.3,1.0,-0.01,0.21,0,0.05,1,0,0,0", "sg3 has R2 = -0.01 pu (ZRNEG)"),
+        ("0,0.2,0.3,1.0,0,0.21,0,-0.05,1,0,0,0", "sg3 has X0 = -0.05 pu (ZX0DV)"),
+        ("0,0.2,0.3,1.0,0,0.21,0,0.05,1,-2,0,0", "sg3 has RG = -2 pu (ZRG)"),
+        ("0,0.2,0.3,1.0,0,0.9,0,0.05,1,0,0,0", "X2 by X'' of sg3 is 4.5, where 0.4 to 2.5"),
+    ],
+)
+def test_a_machines_unusual_value_is_asked_about(row, words, prepared):
+    rows = [f"{n},'1 ',0,0.2,0.3,1.0,0,{X2[n]},0,0.05,1,0,0,0" for n in (1, 2)]
+    assert len(told(prepared(seq(machines=[*rows, f"3,'1 ',{row}"])), words)) == 1
+
+
+def test_a_negative_x2_of_an_old_file_is_asked_about(prepared):
+    text = seq_with(("\n3,'1 ',0,0.21\n", "\n3,'1 ',0,-0.21\n"), old_seq())
+    assert len(told(prepared(text), "sg3 has X2 = -0.21 pu (ZX)")) == 1
 
 
 def test_two_phases_to_earth_without_a_path_are_two_phases_and_it_is_told(prepared):
