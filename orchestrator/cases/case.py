@@ -145,10 +145,12 @@ class Case(CaseDefinition):
             found[-1] = replace(found[-1], questions=(*found[-1].questions, *others))
         beside = partial(self._beside, overrides, step_size, parameters)
         idle = idle_values.idle_everywhere([p.idle for p in found])
-        changed = self._changes(values, parameters)
         return [
             replace(
-                p, beside=beside, questions=(*self.questions, *p.questions, *idle), changed=changed
+                p,
+                beside=beside,
+                questions=(*self.questions, *p.questions, *idle),
+                changed=self._changes(values, parameters, p.idle),
             )
             for p in found
         ]
@@ -195,11 +197,20 @@ class Case(CaseDefinition):
         lost, draft.dispatch = self._switched_off(draft.given.name, before, overrides, parameters)
         return lost
 
-    def _changes(self, overrides: Mapping[str, Value], parameters: Sequence[ParameterFile]) -> str:
-        """The values and files that the caller gave, in few words."""
+    def _changes(
+        self,
+        overrides: Mapping[str, Value],
+        parameters: Sequence[ParameterFile],
+        idle: idle_values.Idle,
+    ) -> str:
+        """The values and files that the caller gave, in few words; a value that cannot act in the scenario says so."""
         changes = [*self.events_given, *(file.path.name for file in parameters if file.text)]
         given = [file.values for file in parameters if not file.text] + [overrides]
-        changes += [f"{key} = {value}" for values in given for key, value in values.items()]
+        changes += [
+            f"{key} = {value}{_WITHOUT_EFFECT if idle_values.is_idle(idle, key) else ''}"
+            for values in given
+            for key, value in values.items()
+        ]
         return few(changes, _NAMED)
 
     def _switched_on(
@@ -403,6 +414,7 @@ def _without_outages(overrides: Mapping[str, Value]) -> dict[str, Value]:
     return {k: value for k, value in overrides.items() if value or not k.endswith(".connected")}
 
 
+_WITHOUT_EFFECT = " (without effect here)"
 _NAMED = 2  # values set that a title names; the others are counted
 _FED = 1e-6  # power of a unit from which its loss is told [pu]
 

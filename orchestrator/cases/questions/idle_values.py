@@ -76,6 +76,12 @@ def idle_values(
     return found
 
 
+def is_idle(idle: Idle, pattern: str) -> bool:
+    """Tell whether a value cannot act in a scenario, at any of the components that a pattern with it names."""
+    asked = [why for name, why in idle.items() if fnmatch.fnmatchcase(name, pattern)]
+    return bool(asked) and all(why is not None for why in asked)
+
+
 def others_on(system: System, pattern: str, variable: str, said: Sequence[str]) -> list[str]:
     """Switches of damping controllers beside one, ``pattern.variable``, that are on though no key says so."""
     switches = {f"{controller}.enabled" for controller in DAMPING_CONTROLLERS}

@@ -203,7 +203,7 @@ class Verbs:
             stable=one["stable"],
             verdict=stability["sentence"],
             because=[text for text in because if text],
-            doubts=_first([*one["warnings"], *found["questions"]]),
+            doubts=_first(dict.fromkeys([*one["warnings"], *found["questions"]])),
         )
 
     def _ask(

@@ -43,6 +43,18 @@ def test_what_acts_is_not_accused(scenarios, values):
     assert not any("cannot act" in str(question) for one in prepared for question in one.questions)
 
 
+def test_a_title_says_which_value_has_no_effect_in_its_scenario():
+    """Of a value that is given to several scenarios where it cannot act alone; patterns count."""
+    values = {"gfor.pod_p.K": 250, "grid.X_L": 0.3}
+    off, on, lacking = CASE.prepare(["gfor", "pod_p", "base"], values)
+    idle = "gfor.pod_p.K = 250 (without effect here), grid.X_L = 0.3"
+    assert off.subject == f"{off.title}, with {idle}"
+    assert on.subject == f"{on.title}, with gfor.pod_p.K = 250, grid.X_L = 0.3"
+    assert lacking.about["subject"] == f"{lacking.title}, with {idle}"
+    (of_pattern,) = CASE.prepare(["gfor"], {"g*.pod_p.K": 250})
+    assert of_pattern.subject.endswith(", with g*.pod_p.K = 250 (without effect here)")
+
+
 def test_lead_and_lag_of_a_gain_of_0_and_what_is_connected_with_nothing():
     (prepared,) = CASE.prepare(["pod_p"], {"gfor.pod_p.K": 0.0})
     assert why_idle(prepared.system, "gfor", "pod_p.T_S1") == "gfor.pod_p.K is 0.0"

@@ -164,6 +164,13 @@ def test_an_explanation_names_who_swings(tmp_path):
     assert told.doubts == []
 
 
+def test_a_doubt_is_told_once(tmp_path):
+    told = Verbs(allowance(tmp_path)).explain("two_area_rms", "base", {"gfor.pod_p.K": 100})
+    assert [text for text in told.doubts if "cannot act" in text] == [
+        "--set gfor.pod_p.K: gfor.pod_p.K cannot act: the scenario has no gfor"
+    ]
+
+
 def test_a_stable_scenario_is_explained_by_its_least_damped_mode(tmp_path):
     told = Verbs(allowance(tmp_path)).explain("two_area", "pod_p")
     (least, *_) = sorted(

@@ -26,7 +26,12 @@ def test_the_files_hold_the_model_with_its_names(tmp_path, capsys):
         ]
     )
     assert code == 0
-    assert "62 states, 1 inputs, 7 outputs" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "62 states, 1 inputs, 7 outputs" in said
+    free = (
+        "SG + GFOR: one eigenvalue, taken for that of the free angle, is zero, and left out of the"
+    )
+    assert free in said  # largest real part of all, the line above says
     content = scipy.io.loadmat(tmp_path / "gfor" / "linear_model.mat", simplify_cells=True)
     assert content["step_size"] == 0
     assert content["A"].shape == (62, 62)
