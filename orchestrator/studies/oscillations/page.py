@@ -23,6 +23,7 @@ from orchestrator.studies.oscillations.tables import opinions_table
 from orchestrator.studies.oscillations.verdict import Located
 
 _LEAST_FLOW = 0.02  # part of the largest energy flow below which a branch has no arrow
+_RED = 0.05  # part of the largest energy flow from which on a bus that feeds it is seen to be red
 _CURVES = 3
 _MEGAWATTS = 100.0  # [MW] that a measurement's base is
 _LINE_WIDTH = 0.01  # of the largest value: two pixels of a chart
@@ -125,7 +126,9 @@ def _map(measured: Measurements, one: Located, others: list[float], figures: Fig
         bus: f"{bus}: {'feeds' if part > 0 else 'takes'} {abs(part):.0%}"
         for bus, part in fed.items()
     }
-    text = "Dissipating energy, as parts of the largest flow: the redder a bus, the more it feeds; arrows along flows."
+    seen = max(fed.values(), default=0.0) > _RED
+    red = "the redder a bus, the more it feeds" if seen else "no bus that is measured feeds any"
+    text = f"Dissipating energy, as parts of the largest flow: {red}; arrows along flows."
     return figures.add(network_map("map of energy flows", branches, fed, texts, flows), text)[0]
 
 

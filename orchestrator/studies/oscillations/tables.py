@@ -43,4 +43,4 @@ def parts_of(opinion: Opinion) -> str:
     observed = [name for name, _ in opinion.ranking]
     if opinion.place is None or opinion.place in observed:
         return parts
-    return f"{opinion.place} is not observed; of those that are: {parts}"
+    return f"{opinion.place}, which the record does not measure; of those that it does: {parts}"

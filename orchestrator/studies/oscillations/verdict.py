@@ -81,7 +81,7 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
     t = signals.times[used]
     periods = len(t) * step * f
     if periods < _FEWEST_PERIODS:
-        return _too_short(periods)
+        return _too_short(periods, t, settles=settle > 0, sinks=found.last < len(signals.times))
     seen, envelopes = [], []
     for k in columns:
         z, half = envelope(t, signals.values[used, k], f)
@@ -111,7 +111,11 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
     return replace(figures, kind=kind, reasons=tuple(reasons))
 
 
-def _too_short(periods: float) -> Evidence:
+def _too_short(periods: float, times: Numbers, *, settles: bool, sinks: bool) -> Evidence:
+    """``times``: those at which it can be judged; ``settles``: whether two periods after its begin are left out;
+    ``sinks``: whether the record goes on."""
+    after = ", two periods after it begins," if settles else ""
+    until = ", when less than half of it is left" if sinks else ""
     return Evidence(
         "not known",
         0.0,
@@ -122,8 +126,8 @@ def _too_short(periods: float) -> Evidence:
         periods=periods,
         disturbed=False,
         reasons=(
-            f"the record shows it for {periods:.1f} periods, and {_FEWEST_PERIODS} are needed "
-            "to tell a driven oscillation from one that decays",
+            f"it can be judged from {times[0]:.1f} s{after} to {times[-1]:.1f} s{until}: {periods:.1f} periods, "
+            f"and {_FEWEST_PERIODS} are needed to tell a driven oscillation from one that decays",
         ),
     )
 

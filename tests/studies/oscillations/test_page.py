@@ -1,13 +1,16 @@
 """The page on a source: every curve that is named is seen, and parts are parts of something."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from orchestrator.studies.oscillations.detection import signals_of
 from orchestrator.studies.oscillations.location import DEF, QV_PHASE, Opinion
 from orchestrator.studies.oscillations.models import OWN_MODEL
-from orchestrator.studies.oscillations.page import envelope_curves
+from orchestrator.studies.oscillations.page import envelope_curves, source_page
 from orchestrator.studies.oscillations.tables import parts_of
-from orchestrator.studies.oscillations.verdict import locate
+from orchestrator.studies.oscillations.verdict import evidence_of, locate
 from tests.support.forced_records import record, sine, times_of
 
 TIMES = times_of(40.0)
@@ -65,5 +68,31 @@ def test_a_named_place_that_is_not_observed_is_told_beside_the_parts_of_those_th
     """A load was named, and its row gave 76 % to a machine."""
     ranking = (("sg2", 0.76), ("sg1", 0.21))
     load = Opinion(OWN_MODEL, "grid.load_7", True, "", ranking)
-    assert parts_of(load) == "grid.load_7 is not observed; of those that are: sg2 76 %, sg1 21 %"
+    assert parts_of(load) == (
+        "grid.load_7, which the record does not measure; of those that it does: sg2 76 %, sg1 21 %"
+    )
     assert parts_of(Opinion(OWN_MODEL, "sg2", True, "", ranking)) == "sg2 76 %, sg1 21 %"
+
+
+def test_too_short_a_record_says_from_when_on_it_can_be_judged(forced):
+    """6.5 periods were told beside a figure with 13: those before its begin, and two after it, do not count."""
+    measured, one = forced
+    signals = signals_of(measured)
+    middle = float(signals.times[len(TIMES) // 2])
+    late = replace(one.found, begin=middle, first=len(TIMES) // 2, last=len(TIMES) * 3 // 4)
+    (why,) = evidence_of(signals, late).reasons
+    begin = middle + 2 / one.found.frequency
+    assert why.startswith(f"it can be judged from {begin:.1f} s, two periods after it begins, to ")
+    assert "s, when less than half of it is left: " in why
+    assert "8 are needed" in why
+
+
+def test_a_map_on_which_no_bus_is_red_promises_none(forced):
+    measured, one = forced
+    words = {}
+    for name in ("sg1", "gfor"):  # the one feeds what the other takes
+        alone = [place for place in measured.places if place.name == name]
+        found = replace(one.found, amplitudes={f"{name}.p": one.found.amplitudes[f"{name}.p"]})
+        words[name] = source_page(replace(measured, places=alone), [replace(one, found=found)])
+    assert "the redder a bus, the more it feeds" in words["sg1"]
+    assert "no bus that is measured feeds any" in words["gfor"]
