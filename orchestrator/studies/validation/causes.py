@@ -78,6 +78,11 @@ class Explanation:
         return leaves_much(self.left, self.noise)
 
     @property
+    def leaves_some(self) -> bool:
+        """Return whether what is left stands above the scatter, if only by what samples and steps make."""
+        return self.noise > 0 and self.left > _TIMES_SCATTER * self.noise
+
+    @property
     def values(self) -> dict[str, float | bool]:
         """Values with which a device has this cause; empty for a delay, and for a limit that no parameter has."""
         if self.cause in (CauseKind.DELAY, CauseKind.LIMIT):

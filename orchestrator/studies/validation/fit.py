@@ -113,6 +113,11 @@ class Fit:
         return self.error_after <= _REACHED
 
     @property
+    def holds(self) -> bool:
+        """Return whether intervals hold: the fit ended, and leaves no more than the recordings' scatter."""
+        return self.finished and self.reached
+
+    @property
     def values(self) -> dict[str, float | bool]:
         """The fitted values; what cannot be told is left where it is."""
         return {one.name: one.value for one in self.parameters if one.value != one.start}

@@ -24,6 +24,7 @@ from orchestrator.studies.validation.words import (
     error_sentence,
     explanation_sentence,
     fit_sentence,
+    interval_head,
     open_sentence,
     sentence,
     untold_words,
@@ -169,7 +170,13 @@ def _fit(result: ValidationResult) -> str:
         ]
         for one in fit.parameters
     ]
-    columns = ["Parameter", "In the model", "Fitted", "95 %", "Can the recordings tell it?"]
+    columns = [
+        "Parameter",
+        "In the model",
+        "Fitted",
+        interval_head(fit),
+        "Can the recordings tell it?",
+    ]
     kept = [one.recording for one in result.confirmations if not one.fitted]
     said = f"<p>{escape(fit_sentence(fit, kept))}</p>"
     checks = confirmation_table(result.confirmations).html()

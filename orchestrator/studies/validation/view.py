@@ -37,6 +37,7 @@ from orchestrator.studies.validation.words import (
     error_sentence,
     explanation_sentence,
     fit_sentence,
+    interval_head,
     open_sentence,
     refused_sentence,
     sentence,
@@ -124,7 +125,7 @@ class Validation:
         fit = self.result.fit
         if fit is None:
             return {}
-        parameters = [one.as_json() for one in fit.parameters]
+        parameters = [one.as_json() | {"holds": fit.holds} for one in fit.parameters]
         checks = [one.as_json() for one in self.result.confirmations]
         return {
             "fit": parameters,
@@ -266,8 +267,15 @@ def parts(found: Validation) -> Iterator[RenderableType]:
         )
     elif result.request.fit and result.interrupted:
         yield "Interrupted before a fit had any values: the figures above are of the recordings alone."
-    if result.refused:
+    if result.refused and _is_doubted(result):
         yield escape(refused_sentence(result.refused))
+
+
+def _is_doubted(result: ValidationResult) -> bool:
+    """Return whether a trial that did not run may matter: one of a search or a fit, or while a question is open."""
+    asked = [question for one in result.comparisons for question in one.questions]
+    searched = result.request.explain or bool(result.request.fit)
+    return searched or any(question.keeps_open for question in asked)
 
 
 def _differences(result: ValidationResult) -> Iterator[str]:
@@ -360,7 +368,7 @@ def _fit_table(fit: Fit) -> PlainTable:
                 untold_words(one),
             )
         )
-    columns = ("Parameter", "Now", "Fitted", "95 %", "Can the recordings tell it?")
+    columns = ("Parameter", "Now", "Fitted", interval_head(fit), "Can the recordings tell it?")
     table = make_table("Fit", *columns, rows=rows)
     table.columns[4].justify = "left"
     return table

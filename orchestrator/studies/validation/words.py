@@ -641,11 +641,22 @@ def _said_of_causes(explanations: Sequence[Explanation]) -> str:
         times = f", {best.left / best.noise:.0f} times the scatter" if best.noise > 0 else ""
         said += (
             f" {best.left:.2g} pu (rms) are left{times}: something else may be off as well, and its part is in this "
-            "value; " + Option.FIT + " finds several values together."
+            "value; " + Option.FIT + " finds several values together." + _second_cause(best)
+        )
+    elif best.leaves_some:
+        said += (
+            f" {best.left:.2g} pu (rms) are left, {best.left / best.noise:.0f} times the scatter, as samples and steps "
+            "make as well." + _second_cause(best)
         )
     if alike:
         said += f" The recordings tell it hardly apart from {'; '.join(map(_cause, alike))}."
     return said
+
+
+def _second_cause(one: Explanation) -> str:
+    """What to type to look for another cause beside the first; empty where that is no value of a parameter."""
+    given = " ".join(f"{Option.SET} {name}={value_text(x)}" for name, x in one.values.items())
+    return f" A second cause is looked for with {given} {Option.EXPLAIN}." if given else ""
 
 
 def _cause(one: Explanation) -> str:
@@ -668,6 +679,11 @@ def refused_sentence(refused: Sequence[RefusedTrial]) -> str:
     return f"{many} of other readings or values did not run; JSON and the page name them."
 
 
+def interval_head(fit: Fit) -> str:
+    """The head of a column with intervals, which says if they do not hold."""
+    return "95 %" if fit.holds else "95 %, does not hold"
+
+
 def fit_sentence(fit: Fit, kept_back: Sequence[str]) -> str:
     """Say on what a fit rests, and if an event that it did not see confirms it."""
     seen = ", ".join(fit.fitted_to)
@@ -684,5 +700,4 @@ def fit_sentence(fit: Fit, kept_back: Sequence[str]) -> str:
     if kept_back:
         return f"{said}; {', '.join(kept_back)} was kept back from it, and the table says whether it agrees."
     said += "; no other event confirms it: give one with --hold-back."
-    sure = fit.reached and fit.finished
-    return f"{said} Intervals hold if the model has the right form." if sure else said
+    return f"{said} Intervals hold if the model has the right form." if fit.holds else said

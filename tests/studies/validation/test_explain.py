@@ -253,6 +253,20 @@ def test_a_switch_leads_before_a_gain_of_nearly_nothing_that_leaves_as_little():
     assert without_worse_ways([gain, other])[0].name == "pod_p.K"
 
 
+def test_a_rest_above_the_scatter_is_told_with_what_looks_for_a_second_cause():
+    """A gain of 140 and a droop of Q of 0.05: the first leaves 0.0009 pu, and the second is seen beside it alone."""
+    gain = Explanation(CauseKind.VALUE, "pod_p.K", "pu", 200.0, 139.6, 0.02, 0.0009, noise=0.0002)
+    said = explanation_sentence([gain])
+    assert "0.0009 pu (rms) are left, 4 times the scatter" in said
+    assert said.endswith("A second cause is looked for with --set pod_p.K=139.6 --explain.")
+    much = explanation_sentence([replace(gain, left=0.004)])
+    assert "something else may be off" in much
+    assert "--set pod_p.K=139.6 --explain" in much
+    assert "second cause" not in explanation_sentence([replace(gain, left=0.0005)])
+    late = replace(gain, cause=CauseKind.DELAY, name="delay of the whole response", value=0.03)
+    assert "second cause" not in explanation_sentence([late])
+
+
 def test_a_cause_beside_another_is_not_said_to_be_all():
     """What one value leaves is counted in scatters of the recording; two ways to one value are one cause."""
     alone = Explanation(CauseKind.VALUE, "pod_p.K", "pu", 200.0, 120.0, 0.04, 0.0009, noise=0.0006)

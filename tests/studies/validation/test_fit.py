@@ -1,6 +1,7 @@
 """Parameters that made a recording are found again, and what it cannot tell is named."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,6 +13,7 @@ from orchestrator.core.errors import INTERRUPTED
 from orchestrator.studies.validation import fit
 from orchestrator.studies.validation.hidden import HiddenVoltage
 from orchestrator.studies.validation.parameters import Adjustable
+from orchestrator.studies.validation.view import Validation, parts
 from tests.benchmarks.validation_draws import TRUTH, starts_of
 from tests.studies.validation.recordings import of_pmu, run, table, with_noise, written
 
@@ -31,9 +33,33 @@ def test_a_gain_is_found_within_its_interval(gfor, recording):
     (found,) = json.loads(out)["fit"]
     assert found["parameter"] == "pod_p.K"
     assert found["identifiable"]
+    assert found["holds"]
     assert found["low"] < 120 < found["high"]
     assert found["value"] == pytest.approx(120, rel=0.05)
     assert found["high"] - found["low"] < 30
+
+
+def test_intervals_beside_an_error_that_stays_do_not_hold(recording):
+    """Its droop is wrong, which the fit of a gain cannot mend."""
+    values = ON | {"droop.R_f": 0.09}
+    found = gfor_in_python.validate("gfor", recording, values=values, fit="pod_p.K")
+    assert not found.result.fit.reached
+    assert not found.as_json()["fit"][0]["holds"]
+    assert "95 %, does not hold" in found.html()
+
+
+def test_what_did_not_run_is_counted_where_something_is_asked_or_searched(recording):
+    """A right model of which nothing is asked: another reading that did not run is in JSON alone."""
+    found = gfor_in_python.validate("gfor", recording, values=ON | {"pod_p.K": 120.0})
+    result = found.result
+    result.request.device.trials.note(
+        "P and Q of one phase", gfor_in_python.CosimError("too large")
+    )
+    counted = "1 trial of other readings or values did not run"
+    assert not any(counted in str(one) for one in parts(found))
+    assert len(found.as_json()["refused"]) == 1
+    searched = Validation(replace(result, request=replace(result.request, explain=True)))
+    assert any(counted in str(one) for one in parts(searched))
 
 
 def test_a_switched_off_controller_is_seen_and_its_gain_with_it(recording):
