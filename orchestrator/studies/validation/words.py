@@ -654,7 +654,7 @@ def _said_of_causes(explanations: Sequence[Explanation]) -> str:
 
 
 def _second_cause(one: Explanation) -> str:
-    """What to type to look for another cause beside the first; empty where that is no value of a parameter."""
+    """Say how another cause beside the first is looked for; empty where that is no value of a parameter."""
     given = " ".join(f"{Option.SET} {name}={value_text(x)}" for name, x in one.values.items())
     return f" A second cause is looked for with {given} {Option.EXPLAIN}." if given else ""
 
