@@ -400,7 +400,7 @@ class Linearised:
         if spectrum is not None:
             eigenvalues = spectrum.eigenvalues.tolist()
             beyond = [mode for mode in oscillating if not low <= mode.frequency_hz <= high]
-            swings = [mode.eigenvalue for mode in beyond if _is_swing(mode, analysis.swing)]
+            swings = [mode.eigenvalue for mode in beyond if is_swing(mode, analysis.swing)]
             outside = replace(
                 hidden(spectrum.eigenvalues, low, high), electromechanical=tuple(swings)
             )
@@ -525,7 +525,7 @@ def _named_range(shown: tuple[float, float]) -> tuple[float, float]:
     )
 
 
-def _is_swing(mode: spectra.Mode, speeds: Sequence[str]) -> bool:
+def is_swing(mode: spectra.Mode, speeds: Sequence[str]) -> bool:
     """Return whether one of the states that show who swings against whom is among those that take part most."""
     states = [state for state, _ in mode.participation[:_LEADING]]
     return any(fnmatch.fnmatchcase(state, pattern) for state in states for pattern in speeds)

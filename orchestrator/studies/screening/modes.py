@@ -1,5 +1,6 @@
 """Critical modes of one operating point, from scratch or from those of another, with a check that none is missed."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,9 +13,16 @@ from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.critical_modes import DENSE, find_critical_modes, nearest_pairs
 from orchestrator.linear.spectra.mode_refinement import RefinedModes, misses_modes, refine
 from orchestrator.linear.spectra.mode_tracking import ModeSet
-from orchestrator.linear.spectra.modes import ZERO, damping_ratio, eigenvalues, find_spectrum
+from orchestrator.linear.spectra.modes import (
+    ZERO,
+    Mode,
+    damping_ratio,
+    eigenvalues,
+    find_spectrum,
+)
 from orchestrator.linear.spectra.shifted_equations import GROWING, ShiftedEquations, count_growing
 from orchestrator.linear.spectra.stability import grows
+from orchestrator.studies.modes.modes import is_swing
 
 _BEYOND = 1.3
 """Modes are followed a little beyond the range and the damping that are asked for, so that those which enter are known
@@ -23,6 +31,10 @@ already."""
 MOST_COUNTED = 4000
 """Up to this number of states, all eigenvalues are computed where growth is counted (4 s of processor time with 3,000
 states), and where a search for some of them does not converge."""
+
+LOCAL_HZ = 3.0
+"""Frequency [Hz] up to which single machines swing against the network (Kundur 1994, section 12.8, has 2 Hz for large
+ones; small ones have been seen at 2.9 Hz). Above the range they are told of, and not followed."""
 
 _BESIDE_ZERO = 1e-2
 """Place [rad/s] beside 0 whose nearest eigenvalues are sought: those that are zero or grow slowly are among them."""
@@ -68,6 +80,9 @@ class FoundModes:
     # Growth [1/s] from which it was counted at all frequencies; slower growth was sought in the range and near 0 only.
     # 0 where all eigenvalues are known.
     slowest: float = 0.0
+    # whether swings of machines were looked for above the range, up to `LOCAL_HZ`, and the least damped one
+    looked_above: bool = False
+    above: Mode | None = None
 
     def critical(self, wanted: CriticalRegion) -> list[int]:
         held = [k for k, value in enumerate(self.modes.eigenvalues.tolist()) if wanted.holds(value)]
@@ -85,16 +100,18 @@ def find_modes_here(
     neighbour: ModeSet | None,
     *,
     count: bool,
+    speeds: Sequence[str] = (),
 ) -> FoundModes:
     """The modes of an operating point.
 
     ``alone``: eigenvalues of the components alone [rad/s], as `count_growing` takes them.
     ``neighbour``: modes of a similar operating point; None searches from scratch.
+    ``speeds``: patterns of the states that swing with machines, for what lies above the range of a small system.
     ``count``: whether all growing eigenvalues are counted, at any frequency. Small systems always are.
     Raises an `AnalysisError` if neither the search nor the growth that is counted comes to an end, and the system is
     too large for all of its eigenvalues."""
     if len(model.names) <= DENSE:
-        return _whole(model, wanted)
+        return _whole(model, wanted, speeds)
     equations = ShiftedEquations(model)
     found = None if neighbour is None else _from_neighbour(model, equations, wanted, neighbour)
     searched = found is None
@@ -104,7 +121,7 @@ def find_modes_here(
         except AnalysisError:
             if len(model.names) > MOST_COUNTED:
                 raise
-            return _whole(model, wanted)
+            return _whole(model, wanted, speeds)
     if not count:
         return FoundModes(found, searched, None)
     if len(model.names) <= MOST_COUNTED:
@@ -169,12 +186,19 @@ def _modes_within(modes: ModeSet, wanted: CriticalRegion) -> ModeSet:
     )
 
 
-def _whole(model: LinearModel, wanted: CriticalRegion) -> FoundModes:
-    spectrum = find_spectrum(model, wanted.wider.lowest_hz, wanted.wider.highest_hz)
-    modes = _modes_within(
-        ModeSet.of([mode for mode in spectrum.modes if mode.is_oscillation], model.names), wanted
-    )
-    return _among(spectrum.eigenvalues, model, modes, searched=True)
+def _whole(model: LinearModel, wanted: CriticalRegion, speeds: Sequence[str] = ()) -> FoundModes:
+    highest = max(wanted.wider.highest_hz, LOCAL_HZ)
+    spectrum = find_spectrum(model, wanted.wider.lowest_hz, highest)
+    swinging = [mode for mode in spectrum.modes if mode.is_oscillation]
+    modes = _modes_within(ModeSet.of(swinging, model.names), wanted)
+    found = _among(spectrum.eigenvalues, model, modes, searched=True)
+    higher = [
+        mode
+        for mode in swinging
+        if wanted.highest_hz < mode.frequency_hz <= LOCAL_HZ and is_swing(mode, speeds)
+    ]
+    above = min(higher, key=lambda mode: mode.damping_percent, default=None)
+    return replace(found, looked_above=True, above=above)
 
 
 def _counted_among_all(model: LinearModel, modes: ModeSet, *, searched: bool) -> FoundModes:

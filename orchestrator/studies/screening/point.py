@@ -296,7 +296,12 @@ class _Worker:
         count = count or (self._task.few and len(model.names) <= MOST_COUNTED)
         own = self._own_eigenvalues(whole) if count else np.zeros(0, dtype=complex)
         found = find_modes_here(
-            model, own, wanted, None if neighbour is None else neighbour.modes, count=count
+            model,
+            own,
+            wanted,
+            None if neighbour is None else neighbour.modes,
+            count=count,
+            speeds=prepared.case.table.analysis.swing,
         )
         warnings = (*warnings, *standing_apart(master, model, found.zeros))
         residues = _residues(found.modes, whole)
@@ -316,7 +321,7 @@ class _Worker:
     ) -> ItemRecord:
         critical, counted = found.critical(self._task.wanted), found.growing_elsewhere is not None
         stable = True if counted and certain else None  # where none grows of those that were found
-        return ItemRecord(
+        record = ItemRecord(
             Status.COMPUTED,
             warnings=warnings,
             residual=residual,
@@ -333,6 +338,12 @@ class _Worker:
             residues=dict(residues),
             links=(-1,) * len(found.modes.eigenvalues),
         )
+        above = found.above
+        if above is None:
+            return replace(record, looked_above=found.looked_above)
+        value = (above.eigenvalue.real, above.eigenvalue.imag)
+        who = next(iter(above.by_component))
+        return replace(record, looked_above=found.looked_above, above=value, who_above=who)
 
     def _own_eigenvalues(self, whole: Mapping[str, Any]) -> Any:
         parts = []

@@ -87,6 +87,11 @@ class ItemRecord:
     # Growth [1/s] from which it was counted at all frequencies; slower growth was sought in the range and near 0 only.
     # 0 where all eigenvalues are known.
     slowest: float = 0.0
+    # whether swings of machines were looked for above the range; real and imaginary part [rad/s] of the least damped
+    # one, None without any, and who takes part most in it
+    looked_above: bool = False
+    above: tuple[float, float] | None = None
+    who_above: str = ""
     # of the modes that are followed [rad/s]
     eigenvalues: NDArray[np.complex128] = field(default_factory=lambda: np.zeros(0, dtype=complex))
     # places of those that are within the range and below the damping, least damped first

@@ -54,6 +54,7 @@ from orchestrator.studies.screening.summary import (
 from orchestrator.studies.screening.trips import run_columns, runs_json, runs_table
 from orchestrator.studies.screening.words import (
     OutageRow,
+    above_the_range,
     by_outage,
     growth_in_short,
     verdict_of,
@@ -133,8 +134,8 @@ class Screening(NoTruth):
         return f"<{head}; all points stand in items(), the worst of each outage in table()>"
 
     def _repr_html_(self) -> str:
-        told = (self.verdict, limits_sentence(self.summary), what_was_counted(self.summary))
-        lines = [*filter(None, told), "items() has all points"]
+        told = (self.verdict, *_lines_behind(self.summary), what_was_counted(self.summary))
+        lines = [*told, "items() has all points"]
         return page(f"Screening of {self.result.plan.case.name}", lines, self.modes())
 
 
@@ -257,8 +258,13 @@ def _every_mode(summary: Summary) -> ColumnTable[tuple[ModeAt, str]]:
 
 
 def verdict(summary: Summary) -> str:
-    told = [escape_markup(text) for text in (limits_sentence(summary), what_was_counted(summary))]
-    return "\n".join(filter(None, (verdict_of(summary).markup(), *told)))
+    told = [escape_markup(text) for text in (*_lines_behind(summary), what_was_counted(summary))]
+    return "\n".join((verdict_of(summary).markup(), *told))
+
+
+def _lines_behind(summary: Summary) -> list[str]:
+    """The lines behind the verdict: what swings above the range, and branches and buses beyond their limits."""
+    return [*filter(None, (above_the_range(summary), limits_sentence(summary)))]
 
 
 def overview(summary: Summary, most: int = 12) -> ColumnTable[OutageRow]:
@@ -471,6 +477,7 @@ def as_json(summary: Summary) -> dict[str, Any]:
         "beyond_rating": summary.beyond or None,
         "limits": limits_json(summary),
         "runs": runs_json(summary),
+        "above_the_range": above_the_range(summary) or None,
         "unstable": list(map(_where, summary.unstable)),
         "failures": failures,
         "modes": list(map(_mode_json, summary.modes)),
@@ -525,7 +532,7 @@ def _page(summary: Summary) -> str:
     kind = f"{plan.prepared.title}, {points}, {outages}"
     shade, sure = SHADES[summary.stable], what_was_counted(summary)
     verdict = re.sub("`([^`]+)`", r"<code>\1</code>", escape(verdict_sentence(summary)))
-    told = "".join(f"<p>{escape(text)}</p>" for text in [limits_sentence(summary)] if text)
+    told = "".join(f"<p>{escape(text)}</p>" for text in _lines_behind(summary))
     findings = (
         f'<div class="findings"><p class="verdict"><b class="{shade}">{verdict}</b></p>{told}'
         f'<p class="soft">{escape(sure)}</p></div>'

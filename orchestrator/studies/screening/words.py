@@ -1,5 +1,7 @@
 """A screening in words: its verdict, what it rests on, what it could not judge, and its outages, worst first."""
 
+import fnmatch
+import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -8,6 +10,7 @@ import numpy as np
 
 from orchestrator.core.options import Option, command
 from orchestrator.linear.spectra.critical_modes import DENSE
+from orchestrator.linear.spectra.modes import damping_percent
 from orchestrator.linear.spectra.shifted_equations import GROWING
 from orchestrator.linear.spectra.stability import zeros_in_words
 from orchestrator.output.report.verdict_sentence import VerdictSentence
@@ -17,7 +20,7 @@ from orchestrator.studies.operating_points.outages import Outage
 from orchestrator.studies.operating_points.point_columns import Elements
 from orchestrator.studies.operating_points.points_file import OperatingCase
 from orchestrator.studies.operating_points.words import ONE_ITEM, all_items, counted_items
-from orchestrator.studies.screening.modes import UNSTABLE
+from orchestrator.studies.screening.modes import LOCAL_HZ, UNSTABLE
 from orchestrator.studies.screening.record import ItemRecord
 from orchestrator.studies.screening.study import ScreenedItem, ScreeningPlan
 from orchestrator.studies.screening.summary import ModeAt, Summary, least_of, where
@@ -246,6 +249,47 @@ def what_was_counted(summary: Summary) -> str:
         f"{others}. Whether something grows at other frequencies was counted at "
         f"{counted}{large}.{_outages_not_asked(summary)}"
     )
+
+
+def above_the_range(summary: Summary) -> str:
+    """Tell of the least damped swing of machines above the range, or that none was looked for; "" where all is said.
+
+    The range's default ends where large machines' swings end: small ones' lie above, and may hardly be damped."""
+    plan = summary.result.plan
+    wanted = plan.wanted
+    items = [one for one in summary.result.items if one.record.status is Status.COMPUTED]
+    if wanted.highest_hz >= LOCAL_HZ or not items:
+        return ""
+    typed = Option.RANGE + f" {wanted.lowest_hz:g}:{LOCAL_HZ:g}"
+    found = [
+        (damping_percent(complex(*one.record.above)), one)
+        for one in items
+        if one.record.above is not None
+    ]
+    least, worst = min(found, key=lambda entry: entry[0], default=(np.inf, items[0]))
+    if worst.record.above is not None and least < 100 * wanted.damping:
+        hertz = worst.record.above[1] / math.tau
+        return (
+            f"Not judged: above the range a machine swings at {hertz:.3f} Hz with {least:.2f} %: "
+            f"{where(summary, worst)} ({worst.record.who_above}); {typed} holds it."
+        )
+    if all(one.record.looked_above for one in items) or not _has_machines(plan):
+        return ""
+    return (
+        f"Not judged: swings of machines from {wanted.highest_hz:g} to {LOCAL_HZ:g} Hz were not looked for; "
+        f"{typed} does."
+    )
+
+
+def _has_machines(plan: ScreeningPlan) -> bool:
+    """Tell whether a component has one of the states that swing with machines."""
+    speeds = plan.prepared.case.table.analysis.swing
+    names = (
+        f"{name}.{variable}"
+        for name, component in plan.prepared.system.components.items()
+        for variable in component.description.variables
+    )
+    return any(fnmatch.fnmatchcase(name, speed) for name in names for speed in speeds)
 
 
 def _outages_not_asked(summary: Summary) -> str:

@@ -20,6 +20,7 @@ from orchestrator.studies.screening.study import plan_screening, run_screening
 from orchestrator.studies.screening.summary import Summary
 from orchestrator.studies.screening.view import as_json, remarks
 from orchestrator.studies.screening.words import (
+    above_the_range,
     by_outage,
     growth_outside,
     verdict_sentence,
@@ -247,3 +248,53 @@ def test_of_outages_that_grow_the_one_that_grows_fastest_is_the_worst():
     )
     order = [row.name for row in by_outage(SimpleNamespace(result=SimpleNamespace(items=items)))]
     assert order == ["line_2", "line_1", "intact", "line_3"]
+
+
+@pytest.mark.parametrize(
+    ("looked", "above", "said"),
+    [
+        (
+            True,
+            (-0.01, 18.4),
+            "Not judged: above the range a machine swings at 2.928 Hz with 0.05 %: out, intact (sg1); "
+            "--range 1:3 holds it.",
+        ),
+        (True, (-9.0, 18.4), ""),  # damped well
+        (True, None, ""),
+        (
+            False,
+            None,
+            "Not judged: swings of machines from 2 to 3 Hz were not looked for; --range 1:3 does.",
+        ),
+    ],
+)
+def test_the_least_damped_swing_above_the_range_is_told(screened, looked, above, said):
+    first, second = screened.items
+    better = (-0.5, 15.0) if above else None
+    items = (
+        replace(first, record=replace(first.record, looked_above=looked, above=better)),
+        replace(
+            second,
+            record=replace(second.record, looked_above=looked, above=above, who_above="sg1"),
+        ),
+    )
+    if above == (-9.0, 18.4):
+        items = (replace(items[0], record=replace(items[0].record, above=above)), items[1])
+    summary = Summary(replace(screened, items=items))
+    assert above_the_range(summary) == said
+    assert as_json(summary)["above_the_range"] == (said or None)
+
+
+def test_a_small_system_is_searched_above_the_range(tmp_path):
+    """The mode at 0.57 Hz grows above a range that ends at 0.5 Hz."""
+    path = tmp_path / "points.csv"
+    path.write_text("name,gfor.in_service,grid.load_2.P\nout,0,1250 MW\n")
+    request = ScreeningRequest(path, None, "gfor", frequencies=(0.1, 0.5))
+    plan = plan_screening(load_case("two_area"), request)
+    found = run_screening(plan, Work(Serial(), PointStore(tmp_path / "points")))
+    (item,) = found.items
+    assert item.record.looked_above
+    real, imaginary = item.record.above
+    assert real > 0
+    assert imaginary / (2 * np.pi) == pytest.approx(0.572, abs=1e-3)
+    assert "(sg" in above_the_range(Summary(found))
