@@ -13,6 +13,7 @@ from orchestrator.cases.networks.psse.raw_records import (
 )
 from orchestrator.cases.networks.psse.raw_tables import BUS_COLUMNS, RawTables, is_in_service
 from orchestrator.cases.networks.psse.transformers import Transformer, star, transformers
+from orchestrator.cases.networks.source_changes import Remark
 
 _SBASE = 100.0  # usual base [MVA]
 _FAR = 20.0
@@ -38,6 +39,7 @@ def read_lines(net: RawTables) -> None:
         text = f"SBASE is {net.raw.base_mva:g} MVA, on which all impedances count; nearly all files have"
         net.changes.note(1, f"{text} {_SBASE:g} MVA: is it meant?")
     _question_ohms(net)
+    _question_short_records(net)
 
 
 def _add_line(net: RawTables, record: Record) -> None:
@@ -80,6 +82,31 @@ def _question_ohms(net: RawTables) -> None:
         if x > _FAR * middle and middle / _FAR < ohms < _FAR * middle:
             text = f"X is {x:g} pu, {x / middle:.3g} times the middle one of all lines; is it in ohms? On "
             net.changes.note(line, f"{text}{kilovolts:g} kV these are {ohms:.3g} pu")
+
+
+def _question_short_records(net: RawTables) -> None:
+    """Ask about branches that are shorter than all ordinary ones, and join two buses or are out of service.
+
+    Where values are missing in the middle of a record, those behind them stand for others."""
+    state = net.column_of_ends + 4
+    joining = net.merged | net.lossless
+    records = net.raw.of("branch")
+    ordinary = [
+        len(record.fields)
+        for record in records
+        if record.line not in joining and record.whole(state, "ST", 1)
+    ]
+    least = min(ordinary, default=0)
+    for record in (record for record in records if len(record.fields) < least):
+        x = record.text(4)
+        effect = f"taken as a zero impedance line ({f'X = {x} pu' if x else 'it has no X'})"
+        if record.line not in joining:
+            effect = "taken as out of service (ST = 0)"
+        text = (
+            f"the record is short, of {len(record.fields)} values, where the other branches have {least} or more, and "
+            f"{effect}: are values missing?"
+        )
+        net.changes.note(record.line, Remark(text, "a short record of a branch"))
 
 
 def _circuit(net: RawTables, record: Record, pair: frozenset[int]) -> str:

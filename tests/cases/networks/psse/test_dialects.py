@@ -134,6 +134,48 @@ def test_zero_impedance_makes_one_bus(read):
     assert "the buses are one" in texts(data)
 
 
+WHOLE = "8,10,'1 ',0.0119,0.1008,0,0,0,0,0,0,0,0,1,1,3,1,1"
+"""A line to a bus with a load."""
+
+
+@pytest.mark.parametrize(
+    ("record", "words"),
+    [
+        (WHOLE, ""),
+        (
+            WHOLE.replace("0.0119,0.1008,", ""),
+            "16 values, where the other branches have 18 or more, and taken as a zero impedance line (X = 0 pu)",
+        ),
+        ("8,10,'1 '", "3 values, where the other branches have 18 or more, and taken as a zero"),
+        ("8,10,'1 '", "(it has no X): are values missing?"),
+        # whole records without impedance, of one owner and out of service
+        (WHOLE.replace("0.1008", "0"), ""),
+        (WHOLE.replace("0,1,1,3", "0,0,1,3"), ""),
+    ],
+)
+def test_a_short_record_of_a_branch_is_told_to_be_short(read, record, words):
+    found = records(33)
+    found["BUS"].append("10,'TIED',230.0,1,1,1,1,1.0,0.0,1.1,0.9,1.1,0.9")
+    found["BRANCH"].append(record)
+    data = read(raw(33, found))
+    said = [x for x in data.changes if "the record is short, of" in x.text]
+    assert len(said) == bool(words)
+    for one in said:
+        assert words in one.text
+        number = raw(33, found).splitlines().index(record) + 1
+        assert one.place.endswith(f"grid.raw, line {number}")
+
+
+def test_a_short_record_that_its_shift_takes_out_of_service_is_told(read):
+    found = records(33)
+    found["BRANCH"].append(
+        "8,9,'2 ',0.1008,0,0,0,0,0,0,0,0,1,0,0,1,1"
+    )  # without R: MET stands in ST
+    assert "17 values, where the other branches have 18 or more, and taken as out of service" in (
+        texts(read(raw(33, found)))
+    )
+
+
 @pytest.mark.parametrize(("line", "is_one"), [("0.012,1e-4,0", True), ("0.012,1e-4,0.02", False)])
 def test_resistance_does_not_keep_buses_apart_and_charging_does(read, line, is_one):
     """So PSS/E's solution has it of psse_raw/case8_voltage_wind_correction.raw (NREL-Sienna/PowerSystemsTestData).
