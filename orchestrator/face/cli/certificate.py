@@ -37,7 +37,7 @@ from orchestrator.studies.certification.certificate import Certificate, DampingC
 from orchestrator.studies.certification.codes import perturbation_plot
 from orchestrator.studies.certification.codes.nts631 import NTS631
 from orchestrator.studies.certification.codes.row import checked, in_words, like
-from orchestrator.studies.certification.codes.row_verdict import NO_VERDICT, NOT_JUDGED
+from orchestrator.studies.certification.codes.row_verdict import NO_VERDICT, NOT_JUDGED, RowVerdict
 from orchestrator.studies.certification.details import Details, read_details
 from orchestrator.studies.certification.files import (
     JSON,
@@ -68,6 +68,9 @@ def show(found: Certificate, files: Sequence[Path], folder: Path, console: Conso
         found.verdict, "green" if found.passed and not found.refused else "red"
     )
     said = found.sentence()
+    open_rows = [v.name for v in found.verdicts if v.not_judged] if found.is_by_rows else []
+    if open_rows:
+        said += f" Not judged: {', '.join(open_rows)}."
     if found.is_by_rows and found.departures:
         said += f" Not as the code has it: {', '.join(found.departures)}."
     console.print(f"[bold {colour}]{escape(said)}[/]", soft_wrap=True)
@@ -111,9 +114,17 @@ def _verdicts(found: Certificate) -> PlainTable:
         failed = "; ".join(f"{f.criterion}: {f.text}" for f in v.failed)
         remark = v.not_judged or failed or (f"nearest: {least.criterion}" if least else "")
         margin = "–" if least is None else margin_of(least)
-        met = f"{sum(f.accepted is True for f in known)} of {len(v.findings)}"
-        table.add_row(v.row.name, word, met, margin, short(remark, _LONGEST))
+        table.add_row(v.row.name, word, _met(v), margin, short(remark, _LONGEST))
     return table
+
+
+def _met(v: RowVerdict) -> str:
+    """Return how many criteria are met, of those that are judged, and how many are not."""
+    judged = [f.accepted for f in v.findings if f.accepted is not None]
+    left = len(v.findings) - len(judged)
+    if not judged:
+        return f"none of {left} judged" if left else "–"
+    return f"{sum(judged)} of {len(judged)}{f', {left} not judged' if left else ''}"
 
 
 def _remarks(found: Certificate) -> list[str]:

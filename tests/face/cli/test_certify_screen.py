@@ -34,6 +34,11 @@ VERDICTS = [
     ),
     RowVerdict(row("dip"), (criterion("voltage", 0.9, 0.5, 0.8, accepted=True),)),
     RowVerdict(row("weak"), unknown="the worker died"),
+    RowVerdict(
+        row("ringing"),
+        (criterion("settles", 1.0, 0.01, None, accepted=None),) * 2,
+        of_the_bench="the bench rings",
+    ),
 ]
 
 
@@ -64,6 +69,11 @@ def test_a_rated_frequency_of_others_stands_in_the_first_line():
     assert first.endswith("Not as the code has it: the rated frequency, 60 Hz in place of 50 Hz.")
 
 
+def test_the_first_line_names_the_rows_that_were_not_judged(screen):
+    assert "1 of 2 judged rows are accepted." in screen.splitlines()[0]
+    assert screen.splitlines()[0].endswith(" Not judged: weak, ringing.")
+
+
 def test_the_verdict_stands_first_and_each_row_has_a_line(screen):
     first = screen.split("└")[0].splitlines()
     cells = [
@@ -76,11 +86,13 @@ def test_the_verdict_stands_first_and_each_row_has_a_line(screen):
         ["jump", "fails"],
         ["dip", "accepted"],
         ["weak", "not judged"],
+        ["ringing", "not judged"],
     ]
-    assert cells[0][4] == "2 judged, 1 failed, 1 not judged"
+    assert cells[0][4] == "2 judged, 1 failed, 2 not judged"
     assert cells[1][2:] == ["1 of 2", "−1.12 pu", "settles: 1.128 pu away"]
     assert cells[2][2:] == ["1 of 1", "+80 %", "nearest: voltage"]
-    assert cells[3][4] == "the worker died"
+    assert cells[3][2:] == ["–", "–", "the worker died"]
+    assert cells[4][2:] == ["none of 2 judged", "–", "the bench rings"]
 
 
 def test_the_help_says_where_each_code_applies(gfor):

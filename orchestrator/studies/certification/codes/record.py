@@ -105,8 +105,12 @@ def row_chapters(c: Certificate, figures: Figures) -> list[tuple[str, str]]:
     return [
         ("Result", table("All criteria", columns, rows, left=9) + without),
         ("Responses and their limits", _pictures(c, figures)),
-        ("What was not tested", bullet_list([*c.code.left_out, *c.departures])),
+        ("What was not tested", bullet_list([*c.code.left_out, *c.departures, *_not_judged(c)])),
     ]
+
+
+def _not_judged(c: Certificate) -> list[str]:
+    return [f"row {v.name}, not judged: {v.not_judged}" for v in c.verdicts if v.not_judged]
 
 
 def _cells_of_finding(v: RowVerdict, f: RowFinding) -> list[str]:
