@@ -288,7 +288,7 @@ def overview(summary: Summary, most: int = 12) -> ColumnTable[OutageRow]:
 
     if 1 < len(plan.points) <= _FEW:
         return ColumnTable(
-            title,
+            title + _out_already(summary, len(rows) * len(plan.points)),
             [*columns, *(at_point(point.name) for point in plan.points)],
             rows,
             texts,
@@ -306,6 +306,12 @@ def overview(summary: Summary, most: int = 12) -> ColumnTable[OutageRow]:
     if any(row.unjudged for row in rows):
         columns.append(Column("Not judged", _unjudged))
     return ColumnTable(title, columns, rows, _place_of(columns, "Damping [%]"), most, ITEMS)
+
+
+def _out_already(summary: Summary, cells: int) -> str:
+    """Say in the title why cells of points have no figure, where no part is missing."""
+    left = summary.result.complete and len(summary.result.items) < cells
+    return "; – where a point has out of service already what the outage takes" if left else ""
 
 
 def _place_of(columns: Sequence[Column[OutageRow]], heading: str) -> int:

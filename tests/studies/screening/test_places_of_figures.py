@@ -39,6 +39,16 @@ def test_an_outage_without_any_verdict_is_told_by_its_first_point():
 
 
 @pytest.mark.parametrize(
+    ("complete", "cells", "said"), [(True, 9, True), (True, 2, False), (False, 9, False)]
+)
+def test_a_cell_without_a_figure_has_its_reason_in_the_title(complete, cells, said):
+    """Line 16–17 is out for maintenance, so its outage is none there; of a part alone others may compute it."""
+    result = SimpleNamespace(complete=complete, items=("one", "two"))
+    text = view._out_already(SimpleNamespace(result=result), cells)
+    assert ("has out of service already what the outage takes" in text) is said
+
+
+@pytest.mark.parametrize(
     ("residues", "first"),
     [
         ({"a": (5.0, 0.1), "b": (1.0, 2.0)}, "a"),
