@@ -121,6 +121,9 @@ GALLERY = {
     "FACTS mode": Broken("MODE is 9", nine("FACTS DEVICE", [FACTS])),
     "VSC": Broken("mend the record, or write", lines("VSC DC LINE", "-50.0", "50000")),
     "DC line": Broken("at its buses' voltages", lines("TWO-TERMINAL DC", "60.0,250", "6000,250")),
+    "DC line at one bus": Broken(
+        "its rectifier and its inverter at one bus", lines("TWO-TERMINAL DC", "8,1,22", "5,1,22")
+    ),
     "motor": Broken("its circuit allows less", lines("INDUCTION MACHINE", ",15.0,", ",150.0,")),
     "no solution with devices": Broken(
         "let them go", lines("TWO-TERMINAL DC", "60.0,250.0", "900.0,2500.0")
