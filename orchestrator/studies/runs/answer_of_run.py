@@ -21,6 +21,7 @@ from orchestrator.studies.runs.answer_of_modes import (
     with_misfits,
 )
 from orchestrator.studies.runs.run import RunResult
+from orchestrator.studies.runs.settling import has_settled
 from orchestrator.systems.coupling.events import Forcing
 
 _UNDECIDED = 0.5
@@ -259,7 +260,11 @@ def _of_a_short_run(shown: _Response) -> ScenarioAnswer | None:
 def _of_settling(shown: _Response) -> ScenarioAnswer:
     rest = f", before the events at {shown.later}" if shown.later else ""
     rest += f"; {shown.by_modes.remark}" if shown.by_modes.remark else ""
-    return shown.answer(True, "stable", f"keeps synchronism and settles by {shown.end:g} s{rest}")
+    mode = shown.by_modes.mode
+    periods = [1 / mode.frequency_hz] if mode is not None and mode.is_oscillation else []
+    settled = has_settled(shown.result, *periods)
+    word = "; has not settled" if settled is False else " and settles"
+    return shown.answer(True, "stable", f"keeps synchronism{word} by {shown.end:g} s{rest}")
 
 
 _RULES: tuple[Callable[[_Response], ScenarioAnswer | None], ...] = (

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from orchestrator.cases.form.schema import KindTable
 from orchestrator.face.cli import main
@@ -205,3 +206,26 @@ def test_a_swing_outside_of_the_range_is_named_where_it_has_less_damping(damping
     assert text.endswith("; --details tells of them.")
     assert ("(`gfor modes CASE --range 0.1:2.3`)" in text) == (damping == -0.4)
     assert "--details" not in outside([modes], details=True)
+
+
+@pytest.mark.parametrize(
+    ("decay", "stop", "said"),
+    [
+        # 1 s, not quite one period of 0.8 Hz, and 9 s with 4 % and without damping
+        (0.2, 2.0, "keeps synchronism; has not settled by 5 s"),
+        (0.2, 10.0, "keeps synchronism and settles by 5 s"),
+        (0.0, 10.0, "keeps synchronism; has not settled by 5 s"),
+    ],
+)
+def test_a_run_settles_where_its_last_swing_is_a_small_part_of_its_largest(decay, stop, said):
+    run = result()
+    times = np.arange(0.0, stop, 0.01)
+    since = np.maximum(times - 1.0, 0.0)
+    common = 1e-3 * times  # a frequency that drifts is no swing
+    swing = 1e-3 * np.exp(-decay * since) * np.sin(5 * since)
+    speeds = {"sg1.omega": 1 + common + swing, "sg2.omega": 1 + common - swing}
+    run.dataset = xr.Dataset(
+        {name: ("time", values) for name, values in speeds.items()}, coords={"time": times}
+    )
+    answer = of_run(run)
+    assert (answer.verdict, answer.remark.partition("; sg1")[0]) == ("stable", said)
