@@ -100,9 +100,9 @@ def test_a_line_with_a_record_is_a_station_at_each_bus(prepared):
     assert "without dynamics" not in texts(ready)
 
 
-def test_ends_at_buses_that_are_one_are_two_stations(prepared):
+def test_ends_at_buses_that_are_one_are_two_stations(gfor, prepared, tmp_path):
     """A line without impedance joins the DC line's buses: each station has its own power and wires."""
-    ready = prepared(joined=True)
+    ready = prepared(recorded=True, joined=True)
     rectifier, inverter = "dc_TIE_1_5", "dc_TIE_1_5_2"
     plans, fed = ready.system.components, sources(ready)
     current = (math.sqrt(250**2 + 4 * 8 * 60) - 250) / 16
@@ -112,6 +112,9 @@ def test_ends_at_buses_that_are_one_are_two_stations(prepared):
     assert fed[f"{rectifier}.inverter.V_most"] == f"{inverter}.V_most"
     assert fed[f"{inverter}.I_dc"] == f"{rectifier}.inverter_I"
     assert fed[f"{rectifier}.v_re"] == fed[f"{inverter}.v_re"] == "grid.bus_5.v_re"
+    run = responses(gfor, tmp_path, "--stop", "0.2")
+    for name in (f"{rectifier}.p", f"{rectifier}.q", f"{inverter}.p", f"{inverter}.q"):
+        assert np.ptp(run[name].to_numpy()) < 1e-5, name
 
 
 @pytest.mark.parametrize("text", [CDC4T, ""], ids=["with a record", "without"])
