@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.core.errors import few
+from orchestrator.core.options import Option
 from orchestrator.core.truth import all_true
 from orchestrator.linear.spectra.modes import Mode, damping_percent
 from orchestrator.output.report.column_table import ShownTable
@@ -179,7 +180,11 @@ def _lower_beside(one: Confirmation) -> str:
     if beside is None:
         return ""
     hertz = f"{beside.imag / math.tau:.3f} Hz"
-    return f", and a swing outside of --range has less: {damping_percent(beside):.2f} % at {hertz}"
+    return (
+        ", and a swing outside of "
+        + Option.RANGE
+        + f" has less: {damping_percent(beside):.2f} % at {hertz}"
+    )
 
 
 def _as_sentence(part: str) -> str:
