@@ -25,6 +25,7 @@ OTHERS = {
     "pip",
     "pytest",
     "ruff",
+    "source",
     "ssh-keygen",
     "tail",
     "test",

@@ -134,9 +134,11 @@ def test_of_a_design_over_points(case, points):
 def test_of_a_design_at_one_point(case):
     study = case.design("pod_p", scenario="gfor", margins=False)
     d = study.result
-    S, setting = d.sensitivities, d.final.setting
+    S, setting, less = d.sensitivities, d.final.setting, d.less_gain
+    bare = less.setting
     source = {
         "modes": [
+            less.eigenvalue,
             d.initial,
             d.predicted,
             d.final.eigenvalue,
@@ -148,6 +150,7 @@ def test_of_a_design_at_one_point(case):
             for value in (S.value, S.compensated)
         ],
         "setting": [setting.gain, setting.filters.T_S1, setting.filters.T_S2, d.target.stages],
+        "less gain": [bare.gain, 0.0, 0],  # without lead/lag
         "gains": [d.unbounded_gain, d.gain_non_compensated, d.gain_compensated],
         "required": [d.required_damping, d.required_damping - damping_ratio(d.initial)],
         "asked": [*d.request.bounds(search=False), d.request.delta_gain, d.request.least_damping],
