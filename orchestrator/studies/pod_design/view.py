@@ -19,7 +19,7 @@ from orchestrator.linear.spectra.modes import Mode, damping_percent, damping_rat
 from orchestrator.output.report.notebook import page
 from orchestrator.output.results.file_writers import save_json
 from orchestrator.output.results.manifest import made_now
-from orchestrator.studies.pod_design.closed_loop import Placed
+from orchestrator.studies.pod_design.closed_loop import Placed, PodSetting
 from orchestrator.studies.pod_design.design import PodDesign
 from orchestrator.studies.pod_design.lead_lag import LeadLag, angle_deg
 from orchestrator.studies.pod_design.margins import Margins
@@ -199,20 +199,17 @@ def design_json(d: PodDesign) -> dict[str, Any]:
 
 
 def parameters_of(d: PodDesign) -> dict[str, bool | float | str]:
-    target = d.target
-    return d.final.setting.parameters(
-        target.key, d.request.controller, target.stages, target.neutral
-    )
+    return _parameters(d, d.final.setting)
 
 
 def parameters_of_less_gain(d: PodDesign) -> dict[str, bool | float | str]:
     """Return the setting of `PodDesign.less_gain` by ``component.variable``; {} where there is none."""
+    return {} if d.less_gain is None else _parameters(d, d.less_gain.setting)
+
+
+def _parameters(d: PodDesign, setting: PodSetting) -> dict[str, bool | float | str]:
     target = d.target
-    if d.less_gain is None:
-        return {}
-    return d.less_gain.setting.parameters(
-        target.key, d.request.controller, target.stages, target.neutral
-    )
+    return setting.parameters(target.key, d.request.controller, target.stages, target.neutral)
 
 
 def _less_gain_json(d: PodDesign) -> dict[str, Any] | None:
