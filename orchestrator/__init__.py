@@ -5,7 +5,7 @@ A name is imported where it is first used, so that ``import orchestrator`` takes
 Examples
 --------
 >>> import orchestrator as gfor
->>> scenario = gfor.load("two_area").scenario("pod_p", {"grid.X_L": 0.3})
+>>> scenario = gfor.load("two_area").scenario("pod_p", {"grid.X_L": 0.2})
 >>> axes = scenario.modes().plot()
 """
 
