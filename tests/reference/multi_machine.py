@@ -93,7 +93,8 @@ class System:
     """A network with machines.
 
     ``constant_torque``: else the mechanical power is constant. ``emf_with_speed``: the emf is in proportion to speed,
-    as in our phasor models; books and stability programs leave it out.
+    as in our phasor models; books and stability programs leave it out. ``unit``: the equations of a machine, by
+    default `Unit`.
     """
 
     buses: int
@@ -106,7 +107,7 @@ class System:
     frequency: float = 60.0
     constant_torque: bool = True
     emf_with_speed: bool = False
-    angles: dict[str, np.ndarray] = field(default_factory=dict, compare=False)
+    unit: Callable[["System", Machine], "Unit"] = field(default_factory=lambda: Unit, compare=False)
 
     # -- network ---------------------------------------------------------------------------------------
 
@@ -189,7 +190,7 @@ class _Motion:
 
     def __init__(self, system: System, v: np.ndarray) -> None:
         self.system, self.v_0 = system, v
-        self.units = [_Unit(system, m) for m in system.machines]
+        self.units = [system.unit(system, m) for m in system.machines]
         self.Y = system.admittance()
         i = self.Y @ v + self._load_currents(v)
         parts = [u.begin(v[u.m.bus - 1], i[u.m.bus - 1]) for u in self.units]
@@ -241,7 +242,7 @@ def _newton(balance: Callable[[np.ndarray], np.ndarray], v: np.ndarray) -> np.nd
     return v
 
 
-class _Unit:
+class Unit:
     """One machine with its exciter, per unit on the machine's base; currents at the bus on 100 MVA."""
 
     def __init__(self, system: System, m: Machine) -> None:
@@ -303,8 +304,12 @@ class _Unit:
         own = [delta, 1.0, E_q1, E_d1]
         if self.sixth:
             own += [E_q1 - (m.X_d1 - m.X_l) * i_d, E_d1 + (m.X_q1 - m.X_l) * i_q]
+        return self.with_exciter(own, abs(v))
+
+    def with_exciter(self, own: list[float], v_t: float) -> np.ndarray:
+        """The machine's states with those of its exciter behind them; E_fd is known."""
         self.first = len(own)
-        x, v_t = self.x, abs(v)
+        x = self.x
         if isinstance(x, Thyristor):
             own += [v_t, self.E_fd / x.K_A] + ([0.0] * 3 if x.K_STAB else [])
             self.V_ref = v_t + self.E_fd / x.K_A
