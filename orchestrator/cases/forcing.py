@@ -38,12 +38,13 @@ _FORMS = {
             r"(\s*,?\s*from\s+(?P<time>\S+\s*[mu]?s))?"
         ),
         "'PLACE, DURATION', such as 'bus_9, 150 ms' or 'line_7_9 at 30 %, 100 ms'; the phases ('1-phase', '2-phase', "
-        "'2-phase-earth'), what clears it ('opens line_7_9'; along a line 'opens it' or 'opens one pole', and "
-        "'recloses after 500 ms')",
+        "'2-phase-earth'), what clears it ('opens line_7_9'; along a line 'opens it' or 'opens one pole'; at one end "
+        "alone 'opens line_7_9 at bus_7' or 'opens it at bus_7'; and 'recloses after 500 ms')",
     ),
 }
 """Option → what it asks for, its form, and that in words."""
 
+_AT = " at "  # between a line and the bus at which alone it opens, as in --outages
 _ALONG = re.compile(r"(?P<line>.+?)\s+at\s+(?P<at>\S+?(\s*%)?)")
 _OPENED = {
     "it": "line",
@@ -101,6 +102,7 @@ def event_of(option: Option, text: str) -> EventInWords:
     try:
         time = to_unit(given.pop("time", _BEGIN), "s")
         given |= {"bus": bus_name(given["bus"])} if " " not in given.get("bus", " ") else {}
+        given |= _at_one_end(given.get("cleared_by", ""))
         along = _ALONG.fullmatch(given.get("bus", ""))
         if along is not None:
             kind, name, given = LineFaultTable, "line_fault", _along_a_line(given, along)
@@ -115,6 +117,12 @@ def event_of(option: Option, text: str) -> EventInWords:
         details = error.errors() if hasattr(error, "errors") else []
         reasons = [_reason(one) for one in details] or [str(error)]
         raise InputError(option + f" {text!r}: {'; '.join(reasons)}") from error
+
+
+def _at_one_end(opened: str) -> dict[str, str]:
+    """Return the keys of what opens at one bus alone; none of what opens whole."""
+    line, at, bus = opened.rpartition(_AT)
+    return {"cleared_by": line, "opens_at": bus_name(bus)} if at else {}
 
 
 def _is_between_ends(at: str) -> bool:

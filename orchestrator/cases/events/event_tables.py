@@ -131,6 +131,7 @@ def _endless(table: schema.EventTable, stop: float) -> Iterator[str]:
 
 
 def _elsewhere(table: schema.EventTable, network: Network | None) -> Iterator[str]:
+    """Questions about a fault at a bus that ends though what leads to it stays closed."""
     if (
         isinstance(table, schema.BusFaultTable)
         and table.cleared_by is not None
@@ -142,6 +143,9 @@ def _elsewhere(table: schema.EventTable, network: Network | None) -> Iterator[st
         if ends and table.bus not in ends:
             text = f"{table.cleared_by} opens for a fault at {table.bus}, but it joins {' and '.join(ends)}"
             yield f"{text}: the fault goes away though nothing that leads to it opens; is another line meant?"
+        elif ends and table.opens_at not in (None, table.bus):
+            text = f"{table.cleared_by} opens at {table.opens_at} alone, and stays joined to {table.bus}"
+            yield f"{text}, where the fault goes away; is its end at {table.bus} meant?"
 
 
 def _all_events_of(

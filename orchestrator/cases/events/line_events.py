@@ -1,7 +1,8 @@
 """Faults and the opening of lines among a case file's events, and what only networks of phasors can do of them."""
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Literal
 
 from fmus.grid.element_data import Line
 from orchestrator.cases.draft import Draft
@@ -29,7 +30,7 @@ def line_events(
             return []
     match table:
         case schema.BusFaultTable():
-            return _bus_fault(table, grid)
+            return _bus_fault(draft, table, grid, where)
         case schema.LineFaultTable():
             return _line_fault(draft, table, grid, where)
         case schema.LineTripTable():
@@ -44,7 +45,7 @@ def _beyond_transients(table: schema.FaultBase | schema.LineTripTable) -> Iterat
         yield f"a fault of kind {table.kind!r}"
     if isinstance(table, schema.LineFaultTable):
         yield "a fault along a line"
-    if isinstance(table, schema.LineTripTable) and table.at is not None:
+    if table.end_bus is not None:
         yield "a line that opens at one end"
 
 
@@ -53,23 +54,60 @@ def _is_of_phasors(draft: Draft, grid: str) -> bool:
     return plan is None or plan.is_of_phasors
 
 
-def _bus_fault(table: schema.BusFaultTable, grid: str) -> list[Event]:
+def _bus_fault(draft: Draft, table: schema.BusFaultTable, grid: str, where: str) -> list[Event]:
     begin = coupled.BusFault(
         table.time, grid, table.bus, True, R=table.R, X=table.X, kind=table.kind
     )
-    events: list[Event] = [begin]
-    if table.duration is not None:
-        end = table.time + table.duration
-        events.append(coupled.BusFault(end, grid, table.bus, False))
-        if table.cleared_by is not None:
-            events += _opening(end, (grid, table.cleared_by), table.reclose_after)
+    if table.duration is None:
+        return [begin]
+    end = table.time + table.duration
+    events: list[Event] = [begin, coupled.BusFault(end, grid, table.bus, False)]
+    if table.cleared_by is not None:
+        line = _LineOfEvent(grid, table.cleared_by, where)
+        events += _opening(draft, line, table.opens_at, (end, table.reclose_after))
     return events
 
 
-def _opening(end: float, line: tuple[str, str], dead: float | None) -> list[Event]:
-    """Return the opening of a line, and its closing after a dead time [s] where there is one."""
-    opened = coupled.LineSwitching(end, *line, False)
-    return [opened] if dead is None else [opened, replace(opened, time=end + dead, connected=True)]
+@dataclass(frozen=True)
+class _LineOfEvent:
+    """A line that an event switches: the grid, its name, and where the case says so."""
+
+    grid: str
+    name: str
+    where: str
+
+
+def _opening(
+    draft: Draft, line: _LineOfEvent, bus: str | None, times: tuple[float, float | None]
+) -> list[Event]:
+    """Return the opening of a line, at one of its buses alone where one is given, and its closing again.
+
+    ``times``: of the opening [s], and from it until the line closes [s], None if it stays open. No events if the line
+    does not lead to the bus, which is noted."""
+    begin, dead = times
+    opened: coupled.LineSwitching | coupled.LineEndSwitching
+    opened = coupled.LineSwitching(begin, line.grid, line.name, False)
+    if bus is not None and (joined := _line(draft, line.name)) is not None:
+        side = _side(draft, joined, bus, line.where)
+        if side is None:
+            return []
+        opened = coupled.LineEndSwitching(begin, line.grid, line.name, side, False)
+    return (
+        [opened] if dead is None else [opened, replace(opened, time=begin + dead, connected=True)]
+    )
+
+
+def _side(draft: Draft, line: Line, bus: str, where: str) -> Literal["from", "to"] | None:
+    """Return which end of a line is at a bus; None, which is noted, if neither is."""
+    if bus == line.from_bus:
+        return "from"
+    if bus == line.to_bus:
+        return "to"
+    draft.note(
+        where,
+        f"{line.name} joins {line.from_bus} and {line.to_bus}, and has no end at {bus!r}; name one of them",
+    )
+    return None
 
 
 def _line_fault(draft: Draft, table: schema.LineFaultTable, grid: str, where: str) -> list[Event]:
@@ -85,7 +123,8 @@ def _line_fault(draft: Draft, table: schema.LineFaultTable, grid: str, where: st
     events.append(coupled.LineFault(end, grid, table.line, table.at, False))
     closed = None if table.reclose_after is None else end + table.reclose_after
     if table.opens == "line":
-        events += _opening(end, (grid, table.line), table.reclose_after)
+        line = _LineOfEvent(grid, table.line, where)
+        events += _opening(draft, line, table.opens_at, (end, table.reclose_after))
     elif table.opens == "pole" and closed is not None:
         events += _pole(draft, table, (grid, where), (end, closed))
     return events
@@ -159,22 +198,8 @@ def _pole(
 
 
 def _line_trip(draft: Draft, table: schema.LineTripTable, grid: str, where: str) -> list[Event]:
-    opened: coupled.LineSwitching | coupled.LineEndSwitching
-    opened = coupled.LineSwitching(table.time, grid, table.line, False)
-    line = _line(draft, table.line)
-    if table.at is not None and line is not None:
-        ends = {line.from_bus: "from", line.to_bus: "to"}
-        if table.at not in ends:
-            draft.note(
-                where,
-                f"{table.line} joins {' and '.join(ends)}; at = {table.at!r} must be one of them",
-            )
-            return []
-        end = "from" if ends[table.at] == "from" else "to"
-        opened = coupled.LineEndSwitching(table.time, grid, table.line, end, False)  # type: ignore[arg-type]
-    if table.reclose_after is None:
-        return [opened]
-    return [opened, replace(opened, time=table.time + table.reclose_after, connected=True)]
+    line = _LineOfEvent(grid, table.line, where)
+    return _opening(draft, line, table.at, (table.time, table.reclose_after))
 
 
 def _line(draft: Draft, name: str) -> Line | None:

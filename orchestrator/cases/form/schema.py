@@ -408,6 +408,11 @@ class LineTripTable(GridEventBase):
     at: Bus | None = None
     reclose_after: Seconds | None = Field(default=None, gt=0)
 
+    @property
+    def end_bus(self) -> str | None:
+        """Return the bus at which alone the line opens; None if it opens at both."""
+        return self.at
+
 
 class LineReclosingTable(GridEventBase):
     type: Literal["line_reclosing"]
@@ -415,12 +420,15 @@ class LineReclosingTable(GridEventBase):
 
 
 class FaultBase(GridEventBase):
-    """Common part of faults: how many phases, the impedance, and how long."""
+    """Common part of faults: how many phases, the impedance, how long, and how the line that opens at the end does:
+    at one of its buses alone, and for how long."""
 
     kind: FaultKind = "3-phase"
     R: PerUnit = Field(default=0.0, ge=0, allow_inf_nan=False)
     X: PerUnit = Field(default=0.0, ge=0, allow_inf_nan=False)
     duration: Seconds | None = Field(default=None, gt=0)
+    opens_at: Bus | None = None
+    reclose_after: Seconds | None = Field(default=None, gt=0)
     _bare: bool = PrivateAttr(default=False)
 
     @model_validator(mode="wrap")
@@ -435,14 +443,18 @@ class FaultBase(GridEventBase):
         """Return whether the duration is a number without a unit."""
         return self.duration is not None and self._bare
 
+    @property
+    def end_bus(self) -> str | None:
+        """Return the bus at which alone the line opens; None if it opens at both, or stays."""
+        return self.opens_at
+
 
 class BusFaultTable(FaultBase):
-    """A fault at a bus; where a line clears it, that line opens when the fault ends."""
+    """A fault at a bus; where a line clears it, that line opens when the fault ends, or its end at one bus alone."""
 
     type: Literal["bus_fault"]
     bus: Bus
     cleared_by: str | None = None
-    reclose_after: Seconds | None = Field(default=None, gt=0)
 
     @model_validator(mode="after")
     def _has_an_end_to_clear(self) -> Self:
@@ -450,6 +462,8 @@ class BusFaultTable(FaultBase):
             raise ValueError(
                 "'reclose_after' needs 'cleared_by': the line that opens, and closes again"
             )
+        if self.opens_at is not None and self.cleared_by is None:
+            raise ValueError("'opens_at' needs 'cleared_by': the line that opens at this bus alone")
         if self.cleared_by is not None and self.duration is None:
             raise ValueError(
                 "'cleared_by' needs 'duration': the time from the fault to the opening of the line"
@@ -459,13 +473,12 @@ class BusFaultTable(FaultBase):
 
 class LineFaultTable(FaultBase):
     """A fault along a line, at a part of the way from its from bus; the line may open as the fault ends, with all
-    three phases or the faulted one, and close again."""
+    three phases or the faulted one, at both ends or at one of its buses alone, and close again."""
 
     type: Literal["line_fault"]
     line: str
     at: Annotated[float, BeforeValidator(_share), Field(gt=0, lt=1)]
     opens: Literal["no", "line", "pole"] = "no"
-    reclose_after: Seconds | None = Field(default=None, gt=0)
 
     @model_validator(mode="after")
     def _is_one_story(self) -> Self:
@@ -475,6 +488,12 @@ class LineFaultTable(FaultBase):
             )
         if self.reclose_after is not None and self.opens == "no":
             raise ValueError("'reclose_after' needs 'opens': what has not opened cannot close")
+        if self.opens_at is not None and self.opens == "no":
+            raise ValueError(
+                "'opens_at' needs 'opens': 'line' or 'pole', which opens at this bus alone"
+            )
+        if self.opens == "pole" and self.opens_at is not None:
+            raise ValueError("'opens_at' is for opens = 'line': one pole opens at both ends")
         if self.opens == "pole" and (self.kind != "1-phase" or self.reclose_after is None):
             raise ValueError(
                 "opens = 'pole' is for a fault of kind '1-phase', and needs 'reclose_after': the dead time"

@@ -87,7 +87,7 @@ def _name_in_events(draft: Draft, names: ElementNames) -> None:
     lines = [*(x.name for x in draft.data.lines), *(x.name for x in draft.data.transformers)]
 
     def with_identifiers(table: EventTable) -> EventTable:
-        known = {"bus": buses, "line": lines, "cleared_by": lines, "at": buses}
+        known = {"bus": buses, "line": lines, "cleared_by": lines, "at": buses, "opens_at": buses}
         given = {key: getattr(table, key, None) for key in known}
         meant = {
             key: names.identifier(value, known[key], table.place or key)
@@ -261,14 +261,24 @@ def _with_switches(network: Network, draft: Draft, *, phasors: bool) -> Network:
     )
 
 
+def _line_with_end(table: EventTable) -> str | None:
+    """Return the line that an event opens at one end alone; None if it opens none so."""
+    match table:
+        case LineTripTable(at=str()):
+            return table.line
+        case LineFaultTable(opens_at=str()):
+            return table.line
+        case BusFaultTable(opens_at=str()):
+            return table.cleared_by
+    return None
+
+
 def _with_line_parts(
     network: Network, tables: Sequence[EventTable], line_ends: frozenset[str]
 ) -> Network:
     """The network with lines whose ends switch one by one, and with faults along lines."""
     faulted = {table.line for table in tables if isinstance(table, LineFaultTable)}
-    ends = line_ends | {
-        table.line for table in tables if isinstance(table, LineTripTable) and table.at is not None
-    }
+    ends = line_ends | {*filter(None, map(_line_with_end, tables))}
     if not (faulted | ends):
         return network
     lines = tuple(

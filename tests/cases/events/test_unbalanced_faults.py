@@ -14,6 +14,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.cases.forcing import event_of, with_events
 from orchestrator.core.errors import CaseError, InputError, QuestionTopic
 from orchestrator.core.options import Option
+from orchestrator.studies.runs.after_events import modes_after
 from orchestrator.systems.coupling.events import (
     LineEndSwitching,
     LineFault,
@@ -242,9 +243,45 @@ def test_a_line_opens_at_one_end_and_its_modes_are_of_that_network(tmp_path):
     assert fed == pytest.approx(v["b1"] * np.conj(drawn + v["b1"] * charged), rel=1e-8)
 
 
+@pytest.mark.parametrize(
+    "fault",
+    ["l31 at 40 %, 50 ms, opens it at b3", "b3, 50 ms, opens l31 at b3, from 0.2 s"],
+    ids=["along the line", "at the bus"],
+)
+def test_a_fault_that_ends_as_one_end_opens_leaves_the_modes_of_that_outage(fault, tmp_path):
+    """By hand the line is the admittance that b1 sees: its π section with nothing at its other end."""
+    prepared(tmp_path, "")
+    case = load_case(tmp_path / "case.toml")
+    (ready,) = with_events(case, [], [fault]).prepare(stop_time=2.0)
+    *_, opened = ready.events
+    assert isinstance(opened, LineEndSwitching)
+    assert (opened.line, opened.end, opened.connected) == ("l31", "from", False)
+    after = modes_after(ready, (0.05, 5.0))
+    z, half = 0.003 + 0.03j, 0.02j
+    y = 100 * (half + 1 / (z + 1 / half))
+    line = next(row for row in RING.splitlines() if row.startswith("lines.l31"))
+    stub = f'shunts.stub = {{ bus = "b1", g = "{y.real} MW", b = "{y.imag} Mvar" }}'
+    (tmp_path / "by_hand.toml").write_text(RING.replace(line, stub))
+    by_hand = gfor.load(tmp_path / "by_hand.toml").scenario().modes((0.05, 5.0))
+    assert [mode.eigenvalue for mode in after.modes] == pytest.approx(
+        [mode.eigenvalue for mode in by_hand], rel=1e-5
+    )
+    assert [mode for mode in after.modes if mode.is_oscillation]
+
+
+def test_a_fault_whose_bus_stays_joined_to_the_line_that_opens_is_asked_about(tmp_path):
+    prepared(tmp_path, "")
+    case = load_case(tmp_path / "case.toml")
+    asked = {}
+    for bus in ("b3", "b1"):
+        (ready,) = with_events(case, [], [f"b3, 50 ms, opens l31 at {bus}, from 0.2 s"]).prepare()
+        asked[bus] = [str(q) for q in ready.questions if "stays joined to b3" in str(q)]
+    assert (len(asked["b3"]), len(asked["b1"])) == (0, 1)
+
+
 def test_what_cannot_be_is_refused_by_name(tmp_path):
     trip = '[[events]]\ntype = "line_trip"\ntime = "0.1 s"\nline = "l31"\nat = "b2"\n'
-    with pytest.raises(CaseError, match="l31 joins b3 and b1; at = 'b2' must be one of them"):
+    with pytest.raises(CaseError, match="l31 joins b3 and b1, and has no end at 'b2'"):
         prepared(tmp_path, trip)
     emt = RING.replace('models = "phasor"', 'models = "emt"').replace("1 ms", "100 us")
     fault = '[[events]]\ntype = "bus_fault"\ntime = "0.1 s"\nbus = "b3"\nkind = "1-phase"\n'
@@ -266,6 +303,11 @@ def test_what_cannot_be_is_refused_by_name(tmp_path):
     [
         ("at = 0.3\nopens = 'line'", "'opens' needs 'duration'"),
         ("at = 0.3\nreclose_after = '1 s'", "'reclose_after' needs 'opens'"),
+        ("at = 0.3\nopens_at = 'b2'", "'opens_at' needs 'opens'"),
+        (
+            "at = 0.3\nduration = '0.1 s'\nopens = 'line'\nopens_at = 'b1'",
+            "l23 joins b2 and b3, and has no end at 'b1'",
+        ),
         ("at = 0.3\nduration = '0.1 s'\nopens = 'pole'", "opens = 'pole' is for a fault of kind"),
         ("at = 1.3", "at"),
         ("at = 0.3\nkind = '4-phase'", "kind"),
@@ -432,6 +474,14 @@ def test_a_screening_takes_an_open_end_as_a_value_of_a_point(tmp_path):
         ),
         ("line_7_9 at 30 %, 100 ms, opens it", {"line": "line_7_9", "at": 0.3, "opens": "line"}),
         (
+            "line_7_9 at 30 %, 100 ms, opens it at 7, recloses after 1 s",
+            {"at": 0.3, "opens": "line", "opens_at": "bus_7", "reclose_after": 1.0},
+        ),
+        (
+            "bus_7, 100 ms, opens line_7_9 at bus_7 from 2 s",
+            {"bus": "bus_7", "cleared_by": "line_7_9", "opens_at": "bus_7", "time": 2.0},
+        ),
+        (
             "A - B at 0.3, 100 ms, 1-phase, opens one pole, recloses after 500 ms",
             {"line": "A - B", "opens": "pole", "reclose_after": 0.5},
         ),
@@ -453,6 +503,12 @@ def test_faults_in_words(text, keys):
         ("line_7_9 at bus_7, 100 ms", "at 'bus_7': along a line it is the share of the way"),
         ("line_7_9 at 30 %, 100 ms, opens line_8", "'opens it' or 'opens one pole'"),
         ("line_7_9 at 30 %, 100 ms, opens one pole", "opens = 'pole' is for a fault of kind"),
+        ("bus_9, 150 ms, opens it at bus_9", "opens 'it': at a bus it names the line"),
+        (
+            "line_7_9 at 30 %, 100 ms, 1-phase, opens one pole at bus_7, recloses after 1 s",
+            "'opens_at' is for opens = 'line'",
+        ),
+        ("line_7_9 at 30 %, 100 ms, opens line_8 at bus_8", "'opens it' or 'opens one pole'"),
     ],
 )
 def test_faults_in_words_that_are_none(text, words):
