@@ -6,10 +6,13 @@ from itertools import pairwise
 from fmus.synchronous_generator.variants import Shaft
 from fmus.toolchain.blocks import BYPASS_TIME, clamp, washout
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.symbols import Expr, Scalar, fmin, if_else
+from fmus.toolchain.symbols import Expr, Scalar, fabs, fmax, fmin, if_else, logic_and
 
 Point = tuple[Scalar, Scalar]
 """x and y of a point of a curve."""
+
+AT_NO_LOAD = 1e-6
+"""Power [pu] below the first point of a curve at which a turbine may start there."""
 
 
 def through_points(x: Expr, points: Sequence[Point]) -> Expr:
@@ -34,6 +37,35 @@ def require_rising_curve(m: ModelBuilder, points: Sequence[Point], text: str) ->
     for (x, y), (next_x, next_y) in pairwise(points):
         rises = fmin(Expr(next_x) - x, Expr(next_y) - y)
         m.require(rises, f"{text}: gate and power must rise from point to point")
+
+
+def curve_of_gate(
+    m: ModelBuilder, points: Sequence[Point], limits: tuple[Expr, Expr]
+) -> tuple[Expr, Expr, Expr]:
+    """Truth of there being a curve of power by gate, and its least and most power; without one those of the gate.
+
+    ``points``: gate and power of GV_1 to PGV_5; all 0 where a record gives none; ``limits``: of the gate. A curve must
+    rise; those of its last points that are 0 are not there."""
+    widest = most = Expr(0)
+    for x, y in points:
+        widest, most = fmax(widest, fabs(x)), fmax(most, y)
+    for (x, y), (next_x, next_y) in pairwise(points):
+        rises = fmin(Expr(next_x) - x, Expr(next_y) - y)
+        is_unused = logic_and(Expr(next_x) <= 0, Expr(next_y) <= 0)
+        text = "governor.GV_1 to governor.PGV_5: gate and power must rise from point to point"
+        m.require(if_else(is_unused, 1, rises), text)
+    exists = widest > 0
+    low, high = limits
+    return (
+        exists,
+        if_else(exists, Expr(points[0][1]) - AT_NO_LOAD, low),
+        if_else(exists, most, high),
+    )
+
+
+def beyond(u: Expr, band: Expr) -> Expr:
+    """What exceeds a dead band of ± ``band`` about 0; all where there is none (0)."""
+    return if_else(band > 0, u - clamp(u, -band, band), u)
 
 
 def derivative_gain(m: ModelBuilder, name: str, u: Expr, K: Expr, T: Expr) -> Expr:

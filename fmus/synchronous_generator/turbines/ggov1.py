@@ -22,6 +22,7 @@ second.
 Sources: IEEE PES-TR1, OpenIPSL at 2be0558a."""
 
 from fmus.synchronous_generator.data_lines import Given, declared, number, power, seconds
+from fmus.synchronous_generator.turbines.curves import beyond
 from fmus.synchronous_generator.turbines.governors import (
     LONGEST_DELAY,
     SOURCE,
@@ -138,8 +139,7 @@ def _error(m: ModelBuilder, p: Given, shaft: Shaft, share: Expr, valve: Expr) ->
     rest = (power_reference(m, P_0) - P_0 - moved) / BYPASS_TIME
     m.derivative(moved, clamp(rest, p.R_down, p.R_up))
     error = p.R * (moved - feedback) + clamp(z, -most, most) - (shaft.w - 1)
-    beyond = if_else(p.db > 0, error - clamp(error, -p.db, p.db), error)
-    return clamp(beyond, p.min_err, p.max_err)
+    return clamp(beyond(error, p.db), p.min_err, p.max_err)
 
 
 def _request(m: ModelBuilder, p: Given, error: Expr, fuel: Expr, w: Expr, valve_0: Expr) -> Expr:

@@ -29,11 +29,12 @@ as their diagrams have it.
 Sources: OPAL-RT's modelica-ephasor-components at 6dc8ca5 (PIDGOV, WSHYGP), PowerSimulationsDynamics.jl at d94d74e
 (PIDGOV, WPIDHY), InterPSS (WPIDHYD), GridPACK at bea5ce1a (WSHYGP)."""
 
-from itertools import pairwise
-
 from fmus.synchronous_generator.data_lines import Given, declared, number, power, seconds
 from fmus.synchronous_generator.turbines.curves import (
+    AT_NO_LOAD,
     Point,
+    beyond,
+    curve_of_gate,
     derivative_gain,
     integral,
     require_rising_curve,
@@ -56,9 +57,7 @@ from fmus.toolchain.blocks import (
     low_pass_or_nothing,
 )
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.symbols import Expr, fabs, fmax, fmin, if_else, logic_and
-
-_AT_NO_LOAD = 1e-6  # power [pu] below the first point at which a turbine may start there
+from fmus.toolchain.symbols import Expr, fabs, if_else
 
 _CONTROLLER = (
     number("K_P", 3.0, "Proportional gain", 0),
@@ -166,7 +165,7 @@ def _start(m: ModelBuilder, p: Given, P_0: Expr) -> tuple[list[Point], Expr]:
     """Points of the gate's curve, and the gate of the operating point."""
     points: list[Point] = [(p.G_0, 0.0), (p.G_1, p.P_1), (p.G_2, p.P_2), (1.0, p.P_3)]
     require_rising_curve(m, points, "governor.G_0 to governor.P_3")
-    require_within(m, P_0, -_AT_NO_LOAD, p.P_3, ("governor.G_0", "governor.P_3"))
+    require_within(m, P_0, -AT_NO_LOAD, p.P_3, ("governor.G_0", "governor.P_3"))
     m.require(-p.V_MIN, "governor.V_MIN must be below 0")
     g_0 = through_points(P_0, [(y, x) for x, y in points])
     require_within(m, g_0, p.G_MIN, p.G_MAX, ("governor.G_MIN", "governor.G_MAX"))
@@ -199,7 +198,7 @@ def wshygp(m: ModelBuilder, shaft: Shaft) -> Expr:
         share = share_of_rating(shaft, p.T_rate)
         P_0 = shaft.P_m_0 / share
         points: list[Point] = [(getattr(p, f"GV_{k}"), getattr(p, f"PGV_{k}")) for k in range(1, 6)]
-        is_curve, low, high = _curve(m, points, (p.P_MIN, p.P_MAX))
+        is_curve, low, high = curve_of_gate(m, points, (p.P_MIN, p.P_MAX))
         require_within(m, P_0, low, high, ("governor.PGV_1", "governor.PGV_5"))
         inverse = through_points(P_0, [(y, x) for x, y in points])
         g_0 = if_else(is_curve, inverse, P_0)
@@ -215,36 +214,14 @@ def wshygp(m: ModelBuilder, shaft: Shaft) -> Expr:
         return share * lead_lag(m, "turbine", of_gate, lead, lag, P_0)
 
 
-def _curve(
-    m: ModelBuilder, points: list[Point], limits: tuple[Expr, Expr]
-) -> tuple[Expr, Expr, Expr]:
-    """Truth of there being a curve, and its least and most power; without one those of the gate."""
-    widest = most = Expr(0)
-    for x, y in points:
-        widest, most = fmax(widest, fabs(x)), fmax(most, y)
-    for (x, y), (next_x, next_y) in pairwise(points):
-        rises = fmin(Expr(next_x) - x, Expr(next_y) - y)
-        is_unused = logic_and(Expr(next_x) <= 0, Expr(next_y) <= 0)
-        text = "governor.GV_1 to governor.PGV_5: gate and power must rise from point to point"
-        m.require(if_else(is_unused, 1, rises), text)
-    exists = widest > 0
-    low, high = limits
-    return (
-        exists,
-        if_else(exists, Expr(points[0][1]) - _AT_NO_LOAD, low),
-        if_else(exists, most, high),
-    )
-
-
 def _speed_controller(m: ModelBuilder, p: Given, shaft: Shaft, share: Expr, g_0: Expr) -> Expr:
     """The gate that is asked for. Without a filter its own feedback is solved for, as it passes directly."""
     e_0, speed = _held_error(m, p, g_0), shaft.w - 1
     P_0, P_e_0 = shaft.P_m_0 / share, shaft.P_e_0 / share
     measured = low_pass_or_nothing(m, "power", shaft.P_e / share, p.T_t, P_e_0)
     of_power = p.T_t > 0
-    beyond = if_else(p.db_1 > 0, speed - clamp(speed, -p.db_1, p.db_1), speed)
     known = if_else(of_power, P_e_0 - measured, g_0)
-    open_error = e_0 + p.R * (power_reference(m, P_0) - P_0 + known) - beyond
+    open_error = e_0 + p.R * (power_reference(m, P_0) - P_0 + known) - beyond(speed, p.db_1)
     own_droop = if_else(of_power, 0, p.R)
 
     has_slope = p.T_f > 0

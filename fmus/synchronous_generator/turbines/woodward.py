@@ -18,7 +18,12 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from fmus.synchronous_generator.data_lines import Given, Line, declared, number, power, seconds
-from fmus.synchronous_generator.turbines.curves import Point, through_points
+from fmus.synchronous_generator.turbines.curves import (
+    AT_NO_LOAD,
+    Point,
+    beyond,
+    through_points,
+)
 from fmus.synchronous_generator.turbines.governors import (
     SOURCE,
     power_reference,
@@ -36,8 +41,6 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, fabs, fmax, if_else, logic_and
 
 _LEAST_FLOW = 1e-3  # smallest flow through a gate [pu] that the flow is divided by
-
-_AT_NO_LOAD = 1e-6  # power [pu] below the first point at which a turbine may start there
 
 _OF_GATE = ((0.0, 0.0), (0.25, 0.25), (0.5, 0.5), (0.75, 0.75), (1.0, 1.0))
 _OF_FLOW = (
@@ -87,7 +90,7 @@ def wehgov(m: ModelBuilder, shaft: Shaft) -> Expr:
         of_gate = _points(m, p, ("Gate", "FlowG"), len(_OF_GATE))
         of_flow = _points(m, p, ("FlowP", "PMECH"), len(_OF_FLOW))
         least, most = of_flow[0][1], _largest(of_flow)
-        require_within(m, P_0, least - _AT_NO_LOAD, most, ("governor.PMECH_1", "governor.PMECH_10"))
+        require_within(m, P_0, least - AT_NO_LOAD, most, ("governor.PMECH_1", "governor.PMECH_10"))
         q_0 = _reached(of_flow, P_0)
         g_0 = _reached(of_gate, q_0)
         require_within(m, g_0, p.G_MIN, p.G_MAX, ("governor.G_MIN", "governor.G_MAX"))
@@ -129,8 +132,7 @@ def _controller(m: ModelBuilder, p: Given, shaft: Shaft, gate: Expr, g_0: Expr) 
     direct, rest = p.K_P + slope, clamp(x, low, high) - slope * slow
     own_droop = if_else(of_control, p.R_gate, 0)
     open_error = moved - (shaft.w - 1) - fed_back - own_droop * rest
-    beyond = if_else(p.db > 0, open_error - clamp(open_error, -p.db, p.db), open_error)
-    error = beyond / (1 + own_droop * direct)
+    error = beyond(open_error, p.db) / (1 + own_droop * direct)
     m.derivative(slow, (error - slow) / lag)
     m.derivative(x, held_at_limits(x, p.K_I * error, low, high))
     return direct * error + rest
