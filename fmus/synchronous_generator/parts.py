@@ -52,11 +52,10 @@ from fmus.synchronous_generator.turbines.governors import (
     constant_torque,
     gast,
     hygov,
-    ieeeg1,
     read_either_way,
     tgov1,
 )
-from fmus.synchronous_generator.turbines.steam import ieesgo, tgov3
+from fmus.synchronous_generator.turbines.steam import ieeeg1, ieesgo, tgov3, wsieg1
 from fmus.synchronous_generator.turbines.water import hygov2, ieeeg2, ieeeg3
 from fmus.synchronous_generator.turbines.water_pid import pidgov, wpidhy, wshygp
 from fmus.synchronous_generator.turbines.woodward import wehgov
@@ -119,7 +118,8 @@ GOVERNORS: dict[str, Governor] = {
     "tgov1": read_either_way(of_speed(tgov1)),
     "hygov": read_either_way(of_speed(hygov)),
     "gast": read_either_way(of_speed(gast)),
-    "ieeeg1": read_either_way(of_speed(ieeeg1)),
+    "ieeeg1": read_either_way(ieeeg1),
+    "wsieg1": read_either_way(wsieg1),
     "degov": read_either_way(degov),
     "degov1": read_either_way(degov1),
     "ggov1": read_either_way(ggov1),

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from fmus.synchronous_generator.turbines.curves import through_points
 from fmus.toolchain.model_builder import ModelBuilder
@@ -254,6 +255,87 @@ def test_a_controller_without_an_integral_holds_its_error(name):
     assert max(map(abs, alone.rates([1.0, P_M]).values())) < 1e-12
 
 
+# -- WSIEG1 -------------------------------------------------------------------------------------
+
+WSIEG1 = {"K": 18.0, "T_1": 7.0, "T_2": 2.5, "T_3": 0.12, "U_o": 0.3, "U_c": -0.4}
+WSIEG1 |= {"T_4": 0.25, "T_5": 6.0, "T_6": 0.5, "T_7": 0.4, "db_1": 6e-4}
+WSIEG1 |= {f"K_{k}": part for k, part in enumerate((0.2, 0.1, 0.2, 0.1, 0.15, 0.05, 0.1, 0.1), 1)}
+VALVES, STEAMS = (0.0, 0.3, 0.6, 0.8, 1.0), (0.0, 0.25, 0.55, 0.8, 1.0)
+OF_VALVE = {f"GV_{k}": x for k, x in enumerate(VALVES, 1)}
+OF_VALVE |= {f"PGV_{k}": y for k, y in enumerate(STEAMS, 1)}
+
+
+def wsieg1_by_scipy(p, speed, end):
+    """P_m at the end of a step of the speed, by another integration of the block diagram."""
+
+    def rate(t, x):
+        control, valve, *stages = x
+        seen = np.sign(speed) * max(abs(speed) - p["db_1"], 0.0)
+        asked = p["K"] * (p["T_2"] / p["T_1"] * (seen - control) + control)
+        moved = np.clip((valve_0 - asked - valve) / p["T_3"], p["U_c"], p["U_o"])
+        if valve >= p["P_MAX"]:
+            moved = min(moved, 0.0)
+        if valve <= p["P_MIN"]:
+            moved = max(moved, 0.0)
+        into = [np.interp(valve, VALVES, STEAMS), *stages[:-1]]
+        lags = [p[f"T_{k}"] for k in (4, 5, 6, 7)]
+        passed = [(a - b) / T for a, b, T in zip(into, stages, lags, strict=True)]
+        return [(seen - control) / p["T_1"], moved, *passed]
+
+    valve_0 = float(np.interp(P_M, STEAMS, VALVES))
+    start = [0.0, valve_0, *[P_M] * 4]
+    last = solve_ivp(rate, (0.0, end), start, rtol=1e-9, atol=1e-11, max_step=0.01).y[2:, -1]
+    return sum((p[f"K_{2 * k + 1}"] + p[f"K_{2 * k + 2}"]) * x for k, x in enumerate(last))
+
+
+@pytest.mark.parametrize("speed", [-0.02, -0.003, -5e-4, 0.0, 0.02])
+def test_wsieg1_answers_a_step_of_the_speed_as_its_diagram_does(speed):
+    """Within its dead band it rests; of a large step the valve moves at its rates, and stops at its limits."""
+    p = WSIEG1 | {"P_MAX": 0.95, "P_MIN": 0.45}
+    alone = governor("wsieg1", p | OF_VALVE)
+    assert not refused(alone)
+    assert max(map(abs, alone.rates([1.0]).values())) < 1e-12
+    found, _ = integrated(alone, lambda t: [1.0 + speed], 4.0, step=2e-3)
+    assert found[-1]["P_m"] == pytest.approx(wsieg1_by_scipy(p, speed, 4.0), abs=2e-6)
+    if abs(speed) < p["db_1"]:
+        assert found[-1]["P_m"] == pytest.approx(P_M, abs=1e-12)
+
+
+@HERTZ
+def test_wsieg1_without_dead_band_and_curve_is_ieeeg1(hertz):
+    p = {name: value for name, value in WSIEG1.items() if name != "db_1"}
+    s = 2j * np.pi * hertz
+    both = [governor(name, p).response(s, [1.0])["P_m", "w"] for name in ("wsieg1", "ieeeg1")]
+    assert both[0] == pytest.approx(both[1], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("block", "low", "high"), [(1, P_M, None), (2, None, P_M), (3, P_M, P_M), (0, None, None)]
+)
+def test_a_limit_of_zero_is_where_wsieg1_starts_if_its_block_says_so(block, low, high):
+    """P_MIN = 0 with 1 and 3, P_MAX = 0 with 2 and 3; else the valve closes, and no valve opens beyond 0."""
+    limits = {"P_MIN": 0.0, "P_MAX": 0.0 if high else 1.0}
+    blocked = governor("wsieg1", limits | {"I_block": block, "T_5": 0.5})
+    assert not refused(blocked)
+    slow, fast = (integrated(blocked, lambda t, w=w: [w], 9.0, step=2e-3)[0] for w in (0.94, 1.06))
+    assert fast[-1]["P_m"] == pytest.approx(0.0 if low is None else low, abs=1e-4)
+    assert slow[-1]["P_m"] == pytest.approx(1.0 if high is None else high, abs=1e-4)
+    if not high:
+        at_zero = refused(governor("wsieg1", {"I_block": block, "P_MIN": 0.0, "P_MAX": 0.0}))
+        assert any("governor.P_MAX" in text for text in at_zero)
+
+
+@pytest.mark.parametrize(
+    ("points", "said"),
+    [
+        ({"PGV_3": 0.4, "PGV_4": 0.5, "PGV_5": 0.6}, "governor.PGV_5"),
+        ({"PGV_1": 0.75, "PGV_2": 0.8, "PGV_3": 0.85, "PGV_4": 0.9}, "governor.PGV_1"),
+    ],
+)
+def test_wsieg1_refuses_a_power_that_its_curve_does_not_reach(points, said):
+    assert any(said in text for text in refused(governor("wsieg1", OF_VALVE | points)))
+
+
 # -- limits -------------------------------------------------------------------------------------
 
 SETTLED = {
@@ -266,6 +348,7 @@ SETTLED = {
     "wpidhy": ({"G_MAX": 0.8, "G_MIN": 0.4}, 0.8, 0.35),
     "wshygp": ({"P_MAX": 0.75, "P_MIN": 0.5}, 0.78, 0.48),
     "wehgov": ({"G_MAX": 0.8, "G_MIN": 0.5}, 0.77, 0.38),
+    "wsieg1": ({"P_MAX": 0.9, "P_MIN": 0.2, "T_5": 1.0} | OF_VALVE, 0.9, 1 / 6),
 }
 
 
@@ -285,6 +368,7 @@ def test_the_gate_stops_at_its_limits(name, side):
         ("ieeeg3", {"U_o": 0.1, "U_c": -0.1}, 0.1),
         ("hygov2", {"V_GMAX": 0.1, "P_MAX": 1.0}, 0.1),
         ("tgov3", {"U_o": 0.1, "U_c": -0.1}, 0.1),
+        ("wsieg1", {"U_o": 0.1, "U_c": -0.1}, 0.1),
         ("pidgov", {"V_MAX": 0.05, "V_MIN": -0.05}, 0.05),
         ("wpidhy", {"V_MAX": 0.05, "V_MIN": -0.05}, 0.05),
         ("wshygp", {"VEL_open": 0.05, "VEL_close": 0.05, "T_P": 0.0}, 0.05),
@@ -342,6 +426,7 @@ def test_a_curve_goes_through_its_points_and_ends_level():
         ("pidgov", {"G_1": 0.05}),
         ("wpidhy", {"P_2": 0.3}),
         ("wshygp", {"GV_3": 0.2}),
+        ("wsieg1", OF_VALVE | {"GV_3": 0.2}),
         ("wehgov", {"FlowG_3": 0.2}),
     ],
 )

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from fmus.grid_following.dyr_approximation import FIELDS
 from fmus.synchronous_generator.dyr_records import DYR_RECORDS
+from fmus.toolchain.dyr_form import DyrField
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, given_values
 from orchestrator.cases.networks.psse.dyr_unit_records import RECORDS_OF_UNITS
 from orchestrator.cases.networks.psse.dyr_values import CEILING, FLOOR, chosen_ceiling
@@ -37,6 +38,7 @@ def doubts_of_machine(
     machine: Machine, records: Sequence[DynamicRecord], values: Mapping[str, float]
 ) -> Iterator[DoubtOfRecord]:
     yield from _omissions(records)
+    yield from _leads_without_lags(records)
     yield from _chosen_limits(records)
     yield from _offsets(records, values)
     yield from _inverse_times(records, values)
@@ -65,6 +67,29 @@ def _omissions(records: Sequence[DynamicRecord]) -> Iterator[DoubtOfRecord]:
                 said = f"{record.name} has {name} = {given[name]:g}: {text}"
                 kind = f"{record.name} without {name}"
                 yield DoubtOfRecord(known.kind, record.place, said, kind)
+
+
+def _leads_without_lags(records: Sequence[DynamicRecord]) -> Iterator[DoubtOfRecord]:
+    """Ask about a lead whose lag is 0: no block has it, so the stage of both is left out."""
+    for record in records:
+        known = RECORDS_OF_UNITS.get(record.name)
+        leads = [] if known is None else [f for f in known.fields if _is_lead(f)]
+        if known is None or not leads:
+            continue
+        given = given_values(record, known.fields, {*RECORDS_OF_UNITS, *FIELDS})
+        for lead in leads:
+            lag = lead.nothing_without
+            if given[lead.name] and not given[lag]:
+                text = (
+                    f"{record.name} has {lead.name} = {given[lead.name]:g} and {lag} = 0: a lead without a lag, so the "
+                    f"stage of both is left out, as GridPACK does; give {lag}, or {lead.name} = 0"
+                )
+                kind = f"{record.name} with a lead and no lag"
+                yield DoubtOfRecord(lead.parameters[0], record.place, text, kind)
+
+
+def _is_lead(field: DyrField) -> bool:
+    return bool(field.nothing_without) and field.name.startswith("T")
 
 
 def _offsets(

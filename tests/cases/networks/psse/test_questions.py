@@ -162,6 +162,28 @@ def test_honest_governors_are_not_asked_about(questions, record):
     assert questions(dyr=changed(DYR, (TGOV1, record))) == []
 
 
+WSIEG1 = IEEEG1.replace("IEEEG1", "WSIEG1").replace("/", "0 0 0 0 0 0 0 0 0 0 0 0 0 0 /")
+
+
+@pytest.mark.parametrize("record", [IEEEG1, WSIEG1])
+@pytest.mark.parametrize(("times", "asked"), [("0 3.3", True), ("0 0", False), ("5 3.3", False)])
+def test_a_lead_without_a_lag_is_asked_about(questions, record, times, asked):
+    name = record.split("'")[1]
+    found = questions(dyr=changed(DYR, (TGOV1, record.replace(" 20 0 0 ", f" 20 {times} "))))
+    said = [q for q in found if f"{name} has T2 = 3.3 and T1 = 0: a lead without a lag" in q]
+    assert len(said) == asked
+
+
+@pytest.mark.parametrize(("place", "said"), [(0, "hysteresis"), (1, "backlash")])
+def test_what_a_governor_of_wecc_leaves_out_is_asked_about(questions, place, said):
+    bands = ["0.0006", *("0.001" if k == place else "0" for k in range(2))]
+    record = (
+        f"3 'WSIEG1' 1 0 0 20 0 0 0.1 1 -10 1 0 0.3 0.3 0 7 0.3 0 0.6 0.4 0 0 0 0 {' '.join(bands)}"
+    )
+    (asked,) = questions(dyr=changed(DYR, (TGOV1, f"{record} {'0 ' * 11}/")))
+    assert said in asked
+
+
 @pytest.mark.parametrize("gain", ["10", "0"])
 def test_a_limiter_of_the_acceleration_that_is_left_out_is_asked_about(questions, gain):
     """GGOV1's Aset, Ka, Ta: no part of ours has them, and with Ka = 0 there is none in PSS/E either."""
