@@ -64,7 +64,7 @@ def curve_of_gate(
 
 
 def beyond(u: Expr, band: Expr) -> Expr:
-    """What exceeds a dead band of ± ``band`` about 0; all where there is none (0)."""
+    """The part of a signal beyond a dead band of ± ``band`` about 0; all of it where the band is 0."""
     return if_else(band > 0, u - clamp(u, -band, band), u)
 
 
