@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from orchestrator.linear.doubts.common_speed import is_common_speed
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.linear.spectra.stability import Cause
 from orchestrator.output.report.short_texts import first_few
@@ -50,8 +51,7 @@ def _remark(result: ModesResult, mode: Mode | None) -> str:
     if verdict.stable or verdict.mode is None:
         return swing
     place = _outside(result, verdict.mode)
-    participation = verdict.mode.participation
-    who = f": {participation[0][0]}" if place and participation else ""
+    who = _who_grows(result, verdict.mode) if place else ""
     because = "; cause: the coupling" if verdict.cause is Cause.COUPLING else ""
     grows = f"grows at {verdict.mode.eigenvalue.real:+.3g} 1/s{place}{who}{because}"
     if swing and not place:
@@ -59,6 +59,12 @@ def _remark(result: ModesResult, mode: Mode | None) -> str:
     if mode is not None and mode.eigenvalue.real > 0:
         return f"{grows}; the mode at {mode.frequency_hz:.3f} Hz grows as well: {swing}"
     return grows
+
+
+def _who_grows(result: ModesResult, growing: Mode) -> str:
+    if is_common_speed(growing, result.swing):
+        return ": the common speed"
+    return f": {growing.participation[0][0]}" if growing.participation else ""
 
 
 def _outside(result: ModesResult, growing: Mode) -> str:
