@@ -17,6 +17,7 @@ from orchestrator.core.interrupts import calls
 from orchestrator.core.late import import_xarray_alone, put_off_parts_of_numpy
 from orchestrator.core.safe_files import inputs, spare_input
 from orchestrator.core.spelling import as_options
+from orchestrator.core.uncollected import stay_uncollected, uncollected
 from orchestrator.face.cli.interrupted import ending, is_interrupt
 from orchestrator.face.cli.later import answer_first
 from orchestrator.output.results import origin
@@ -59,15 +60,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if arguments is None else list(arguments)
     _print_anything()
     put_off_parts_of_numpy()
-    with calls.terminable(ending=arguments is None), as_options():
-        code = _run(words)
+    alone = arguments is None
+    with calls.terminable(ending=alone), as_options():
+        code = _run(words, alone=alone)
     return TERMINATED if calls.terminated and code == INTERRUPTED else code
 
 
-def _run(words: Sequence[str]) -> int:
-    """Run; where it returns, no signal changes the exit code any more."""
+def _run(words: Sequence[str], *, alone: bool) -> int:
+    """Run; where it returns, no signal changes the exit code any more. ``alone`` as in `_execute`."""
     try:
-        code = _execute(words)
+        code = _execute(words, alone=alone)
         if calls.taken and code != INTERRUPTED:
             raise KeyboardInterrupt  # somebody swallowed it on its way
         calls.over = True
@@ -83,7 +85,8 @@ def _run(words: Sequence[str]) -> int:
     return code
 
 
-def _execute(words: Sequence[str]) -> int:
+def _execute(words: Sequence[str], *, alone: bool) -> int:
+    """Parse and compute; ``alone``: whether the process has nothing else to do."""
     files: dict[str, Path] = {}
 
     def tell_origin() -> dict[str, Any]:
@@ -91,10 +94,14 @@ def _execute(words: Sequence[str]) -> int:
 
     try:
         words = _spelt_today(words)
-        with calls:  # libraries take an interrupt in their import for an error of their own
+        # libraries take an interrupt in their import for an error of their own, and to look for circles among what is
+        # imported takes a quarter of a short command's time
+        with calls, uncollected():
             # others' studies are looked for only where the command is none of ours: it takes a moment
             listed = COMMANDS if _command_in(words) else commands()
             parser = _parser({_command_in(words, listed)}, listed)
+        if alone:
+            stay_uncollected()
         options = parser.parse_args(words)
         origin.check_named(vars(options))
         files |= origin.files_read(vars(options))

@@ -42,3 +42,20 @@ def test_a_case_is_loaded_without_what_computes():
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout == "set()\n"
+
+
+@pytest.mark.parametrize(("given", "set_aside"), [("", True), ("sys.argv[1:]", False)])
+def test_what_a_command_imports_is_not_searched_for_circles_again(given, set_aside):
+    """Unless it was called from Python, whose own circles would never be freed."""
+    code = (
+        "import gc, sys; from contextlib import suppress; from orchestrator.face.cli import main\n"
+        f"with suppress(SystemExit): main({given})\n"
+        "print(gc.isenabled(), gc.get_freeze_count() > 10_000)"
+    )
+    found = subprocess.run(
+        [sys.executable, "-c", code, "identify", "--help"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert found.stdout.splitlines()[-1] == f"True {set_aside}"

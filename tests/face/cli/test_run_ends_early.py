@@ -122,7 +122,7 @@ def test_an_interrupt_inside_exec_leaves_the_exit_code_alone(tmp_path):
     code = """
 import sys
 from orchestrator.face import cli
-cli._execute = lambda words: exec("raise KeyboardInterrupt")
+cli._execute = lambda words, alone: exec("raise KeyboardInterrupt")
 sys.exit(cli.main())
 """
     (tmp_path / "planted.py").write_text(code, encoding="utf-8")
