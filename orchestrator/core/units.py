@@ -1,5 +1,6 @@
 """Numbers with units, as people write them in a case file: ``"1350 MW"``, ``"100 us"``."""
 
+import math
 import re
 from functools import cache
 from threading import Lock
@@ -19,7 +20,7 @@ USUAL: dict[str, dict[str, float]] = {
     "MVA": {"MVA": 1.0, "VA": 1e-6, "kVA": 1e-3, "GVA": 1e3},
     "Mvar": {"Mvar": 1.0, "var": 1e-6, "kvar": 1e-3, "Gvar": 1e3},
     "kV": {"kV": 1.0, "V": 1e-3},
-    "rad": {"rad": 1.0},
+    "rad": {"rad": 1.0, "deg": math.pi / 180},
     "deg": {"deg": 1.0},
     "pu": {"pu": 1.0},
 }

@@ -235,7 +235,7 @@ def in_base(
     scaled = channel.factor * values
     if not unit:
         return np.asarray(scaled), ""
-    for base in _BASES[channel.role]:
+    for base in sorted(_BASES[channel.role], key=lambda base: base != unit):
         try:
             return np.asarray(scaled * to_unit(f"1 {unit}", base)), base
         except ValueError:
