@@ -38,11 +38,14 @@ def is_measured(curve: xr.DataArray) -> bool:
 def measured_modes(
     window: xr.DataArray, coarser: float = 1.0, order: int | None = None
 ) -> list[IdentifiedMode]:
-    """Modes of a measured signal; ``order``: of the model, found from the signal's noise where it is not given."""
+    """Modes of a measured signal; ``order``: of the model, found from the signal's noise where it is not given.
+
+    A model whose order is given needs no noise: the resolution tells which rows say nothing."""
     times, values = window["time"].values, np.asarray(window.values, dtype=float)
     _check(times, values, float(window.coords[LINE_FREQUENCY]))
-    tolerance = coarser * _singular_values(window)[1]
-    return identify_modes(times, values - float(values.mean()), tolerance=tolerance, order=order)
+    noise = _LEAST_NOISE if order else _singular_values(window)[1]
+    deviation = values - float(values.mean())
+    return identify_modes(times, deviation, tolerance=coarser * noise, order=order)
 
 
 def order_of(window: xr.DataArray) -> int:
