@@ -291,7 +291,7 @@ FOR_TYPES = {
 arrows."""
 
 
-LATE = {"pandas", "scipy.optimize", "scipy.signal", "scipy.stats", "xarray"}
+LATE = {"pandas", "scipy.interpolate", "scipy.optimize", "scipy.signal", "scipy.stats", "xarray"}
 """Libraries that `core.late` stands in for."""
 
 

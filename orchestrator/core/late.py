@@ -30,10 +30,11 @@ class Late:
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
-    from scipy import optimize, signal, stats
+    from scipy import interpolate, optimize, signal, stats
 else:
     pd, xr = (Late(name) for name in ("pandas", "xarray"))
-    optimize, signal, stats = (Late(f"scipy.{name}") for name in ("optimize", "signal", "stats"))
+    interpolate, optimize = (Late(f"scipy.{name}") for name in ("interpolate", "optimize"))
+    signal, stats = (Late(f"scipy.{name}") for name in ("signal", "stats"))
 
 
 class _PutOff:
@@ -73,6 +74,7 @@ def import_xarray_alone() -> None:
 
 __all__ = [
     "import_xarray_alone",
+    "interpolate",
     "optimize",
     "pd",
     "put_off_parts_of_numpy",

@@ -13,6 +13,7 @@ import numpy as np
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.core.errors import InputError
+from orchestrator.core.late import interpolate
 from orchestrator.core.options import Option
 from orchestrator.studies.validation.angle_questions import (
     questions_beside_frequency,
@@ -140,22 +141,18 @@ class Recording:
             found: Complex = np.interp(times, self.times, self.voltage)
             return found
         angle = np.unwrap(np.angle(self.voltage))
-        along = _along_curves if self.bends else np.interp
+        along = _along_cubics if self.bends else np.interp
         magnitude = along(times, self.times, np.abs(self.voltage))
         return np.asarray(magnitude * np.exp(1j * along(times, self.times, angle)))
 
 
-def _along_curves(times: Numbers, known: Numbers, values: Numbers) -> Numbers:
+def _along_cubics(times: Numbers, known: Numbers, values: Numbers) -> Numbers:
     """Values between samples at even times, along cubics whose slopes are those of the samples beside each.
 
     E. Catmull, R. Rom, A class of local interpolating splines, 1974."""
-    interval = known[1] - known[0]
-    slopes = np.gradient(values)
-    place = np.clip((times - known[0]) / interval, 0.0, len(known) - 1.0)
-    k = np.minimum(place.astype(int), len(known) - 2)
-    x = place - k
-    ends = (1 + 2 * x) * (1 - x) ** 2 * values[k] + x**2 * (3 - 2 * x) * values[k + 1]
-    return np.asarray(ends + x * (1 - x) ** 2 * slopes[k] + x**2 * (x - 1) * slopes[k + 1])
+    slopes = np.gradient(values, known[1] - known[0])
+    inside = np.clip(times, known[0], known[-1])
+    return np.asarray(interpolate.CubicHermiteSpline(known, values, slopes)(inside))
 
 
 def read_recording(

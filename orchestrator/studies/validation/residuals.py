@@ -113,7 +113,7 @@ class Residuals:
         after, and curves to either side of the straight lines. None for fast samples."""
         here = self.at(values)
         found = []
-        for changed in ((_jumps_at(0.0), _jumps_at(1.0)), (_along_curves,)):
+        for changed in ((_jumps_at(0.0), _jumps_at(1.0)), (_bending,)):
             columns = [self._errors_by(change, values) - here for change in changed]
             if any(column.any() for column in columns):
                 found.append(np.column_stack(columns))
@@ -164,7 +164,8 @@ def _jumps_at(part: float) -> Callable[[RecordedEvent], Recording]:
     )
 
 
-def _along_curves(event: RecordedEvent) -> Recording:
+def _bending(event: RecordedEvent) -> Recording:
+    """An event's voltage along smooth curves between its samples."""
     return replace(event.recording, bends=True)
 
 
