@@ -1,9 +1,8 @@
-"""Sentences of a validation: questions, and the one that answers what was asked."""
+"""Sentences of a validation: questions about the model, and the one that answers what was asked."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 from orchestrator.core.errors import number_of
 from orchestrator.core.options import Option
@@ -14,10 +13,14 @@ from orchestrator.studies.validation.event import EventComparison, JumpDoubt
 from orchestrator.studies.validation.fit import Fit, FittedParameter, Untold
 from orchestrator.studies.validation.limits import Criterion, LimitVerdict, OpenCause
 from orchestrator.studies.validation.questions import Question, QuestionKind
+from orchestrator.studies.validation.recorder_words import (
+    RECORDER_SENTENCES,
+    Figures,
+    Sentence,
+    fall_of_error,
+)
 from orchestrator.studies.validation.swing import PlantSwing, swings_of
 from orchestrator.studies.validation.trials import RefusedTrial
-
-Figures = Mapping[str, Any]
 
 _COUPLED_STEP = 100.0  # communication step of a coupled run [us]
 
@@ -25,92 +28,6 @@ _COUPLED_STEP = 100.0  # communication step of a coupled run [us]
 def sentence(question: Question) -> str:
     """A question with its figures and what to type."""
     return _SENTENCES[question.kind](question.figures)
-
-
-def _voltage_level(x: Figures) -> str:
-    cause = f"{x['cause']}? Then give" if x["cause"] else "is the rated voltage right? Else give"
-    return f"before the event the voltage is {x['v']:.4g} pu: {cause} --channel '{x['remedy']}'"
-
-
-def _rating(x: Figures) -> str:
-    if x["remedy"]:
-        given = " ".join(Option.CHANNEL + f" '{one}'" for one in x["remedy"])
-        return (
-            f"before the event the plant feeds {x['s']:.4g} pu of its rating of {x['rating']:g} MVA: are P and Q in kW "
-            f"and kvar? Then give {given}"
-        )
-    return (
-        f"before the event the plant feeds {x['s']:.3g} pu of its rating of {x['rating']:g} MVA: is the rating that of "
-        "the whole plant? Give it with --set S_n=…, or the power's unit with --channel"
-    )
-
-
-def _rated_frequency(x: Figures) -> str:
-    if "left" in x:
-        return (
-            f"is the rated frequency {x['seen']:g} Hz? The device has {x['rated']:g} Hz; with the other one the error "
-            f"falls from {x['error']:.3g} to {x['left']:.3g} pu (rms). If it is so, give --set f_n={x['seen']:g}; "
-            "if not, a droop of the model is wrong"
-        )
-    return (
-        f"before the event the frequency is {x['seen']:.4g} Hz, and the device's is {x['rated']:g} Hz: give its rated "
-        "frequency, as in --set f_n=60, or the channel's unit"
-    )
-
-
-def _angle_unit(x: Figures) -> str:
-    return (
-        f"the angle jumps by {x['jump']:.4g} from one sample to the next, or begins beyond a turn: it looks like "
-        f"{x['unit']}. Give --channel '{x['remedy']}' if it is"
-    )
-
-
-def _angle_held(x: Figures) -> str:
-    return (
-        f"{x['part']:.0%} of the angle's samples are that of the sample before: the recorder holds it, and the device "
-        "sees steps that the plant did not. Give a recording with its own samples"
-    )
-
-
-def _angle_and_frequency(x: Figures) -> str:
-    return (
-        f"the angle turns {x['factor']:.4g} times as fast as the recording's frequency says: unit or sign of one is "
-        f"wrong. If it is the angle's, give --channel '{x['remedy']}'"
-    )
-
-
-def _frequency_alone(x: Figures) -> str:
-    return (
-        "there is no angle, and the voltage's is the integral of the frequency, which recorders filter for 0.1 s and "
-        "longer: steps of the angle are missing. Give the angle where it was recorded"
-    )
-
-
-def _phase_order(x: Figures) -> str:
-    what = "voltages" if x["what"] == "v" else "currents"
-    given = " ".join(f"--channel '{one}'" for one in x["remedy"])
-    return f"the phases of the {what} follow each other as a, c, b: are two of them exchanged? If so, give {given}"
-
-
-def _time_unit(x: Figures) -> str:
-    return (
-        f"the times look like {_TIMES[x['unit']]}: a sample every {x['interval']:.3g} s, {x['length']:.4g} s in all"
-        + (
-            f"; read so, the error falls from {x['error']:.3g} to {x['left']:.3g} pu (rms)"
-            if "left" in x
-            else ""
-        )
-        + f". If they are, give --channel '{x['remedy']}'"
-    )
-
-
-_TIMES = {
-    "us": "microseconds",
-    "ms": "milliseconds",
-    "min": "minutes",
-    "h": "hours",
-    "d": "days, as spreadsheets have them",
-}
 
 
 def _bases_assumed(x: Figures) -> str:
@@ -134,94 +51,11 @@ def _no_event(x: Figures) -> str:
     )
 
 
-def _slow_samples(x: Figures) -> str:
-    return (
-        f"a sample every {1000 * x['interval']:.4g} ms holds nothing faster than {x['fastest']:.3g} Hz: controls that "
-        f"act faster{x['such']} are neither confirmed nor refuted by it"
-    )
-
-
 def _doubt_unknown(x: Figures) -> str:
     return (
         f"the device does not run again as it must to show what the {x['of']} makes of the error where the voltage "
         f"jumps ({x['said']}): no error around the jump is judged. Give a recording in which the voltage moves without "
         "a jump"
-    )
-
-
-def _missing(x: Figures) -> str:
-    return (
-        f"{x['count']} of {x['of']} samples are missing, for up to {x['longest']:.3g} s: they are bridged in the "
-        "voltage and not compared"
-    )
-
-
-def _unmeasured(x: Figures) -> str:
-    return (
-        f"P or Q is missing for {x['length']:.3g} s from {x['at']:.4g} s on, where the voltage is known: what the "
-        "plant did there is not compared. Give a recording without the gap, or an event apart from it"
-    )
-
-
-def _filled(x: Figures) -> str:
-    return (
-        f"{x['count']} samples stand still while those before and after move, from {x['at']:.4g} s on: the recorder "
-        "filled a gap with the last value. They are taken as missing: bridged in the voltage and not compared"
-    )
-
-
-def _gap_at_event(x: Figures) -> str:
-    return (
-        f"samples are missing for {x['length']:.3g} s from {x['at']:.4g} s on, where the voltage changes: what drove "
-        "the plant there is not known, and the event is not judged. Give a recording without the gap, or another event"
-    )
-
-
-def _lost_jump(x: Figures) -> str:
-    return (
-        f"the angle lacks up to {x['jump']:.3g} deg from {x['at']:.4g} s on, as one that is smoothed over "
-        f"{1000 * x['length']:.3g} ms does; without that the error falls from {x['error']:.3g} to "
-        f"{x['left']:.3g} pu (rms): was the angle integrated from a filtered frequency, or filtered by itself? Give "
-        "the angle as it was measured, with --channel 'angle=COLUMN'"
-    )
-
-
-def _lost_step(x: Figures) -> str:
-    return (
-        f"the magnitude of the voltage lacks up to {x['jump']:.3g} pu from {x['at']:.4g} s on, as one that is smoothed "
-        f"over {1000 * x['length']:.3g} ms does; without that the error falls from {x['error']:.3g} to "
-        f"{x['left']:.3g} pu (rms): was it filtered by the recorder? Give the magnitude as it was measured, with "
-        + Option.CHANNEL
-        + " 'v=COLUMN'"
-    )
-
-
-def _angle_jump(x: Figures) -> str:
-    return (
-        f"the angle jumps by {x['jump']:+.3g} deg at {x['at']:.4g} s, where the magnitude stays, and P and Q move by "
-        f"{x['seen']:.2g} pu, the model's by {x['asked']:.2g} pu: did the recorder take another reference for the "
-        "angle, or lose the time? What comes after is not judged. Give an angle without the jump, with "
-        + Option.CHANNEL
-        + " 'angle=COLUMN', or the part before, with "
-        + Option.STOP
-    )
-
-
-def _stored_twice(x: Figures) -> str:
-    return (
-        f"{x['count']} samples in a row, from {x['first']:.4g} s on, come again to the last digit from {x['at']:.4g} s "
-        "on, which no instrument measures: was a block stored twice? Give the samples that were measured there, or the "
-        "part before, with " + Option.STOP + f" {x['at']:.4g}"
-    )
-
-
-def _lagged(x: Figures) -> str:
-    which = " and ".join(x["signals"]).upper().replace("AND", "and")
-    follows = "follow" if len(x["signals"]) > 1 else "follows"
-    return (
-        f"{which} {follows} the model's like one behind a lag of {1000 * x['lag']:.3g} ms, and beside that the error "
-        f"falls from {x['error']:.2g} to {x['left']:.2g} pu (rms): does the recorder filter it, or has the plant a lag "
-        "that the model lacks? Give it as it was measured, with " + Option.CHANNEL
     )
 
 
@@ -243,75 +77,14 @@ def _start(x: Figures) -> str:
     )
 
 
-def _read_otherwise(x: Figures) -> str:
-    given = " ".join(Option.CHANNEL + f" '{one}'" for one in x["remedy"])
-    return (
-        f"{x['reading']}? Read so, the error falls from {x['error']:.3g} to {x['left']:.3g} pu (rms). If it is so, "
-        f"give {given}"
-    )
-
-
-def _stuck(x: Figures) -> str:
-    return (
-        f"{x['column']!r} is {x['value']:.4g} in all {x['count']} samples, which no instrument measures: was it "
-        f"recorded at all? Give the column that holds it, as in "
-        + Option.CHANNEL
-        + f" '{x['role']}=COLUMN'"
-    )
-
-
-def _power_held(x: Figures) -> str:
-    return (
-        f"{x['column']!r} stands still to the last digit {x['count']} times while it moves, for {x['usual']:.3g} s and "
-        f"up to {x['longest']:.3g} s, and jumps in between: is it stored only every so often, or only where it has "
-        f"changed by enough? The errors count that as the model's. Give the measured samples, as in --channel "
-        f"'{x['role']}=COLUMN'"
-    )
-
-
-def _spike(x: Figures) -> str:
-    return (
-        f"{x['column']!r} leaves both samples beside it by {x['jump']:.3g} pu at {x['at']:g} s: is that a fault of the "
-        "recorder? Leave the cell empty if it is"
-    )
-
-
-def _clipped(x: Figures) -> str:
-    return (
-        f"{x['column']!r} comes to {x['value']:.4g} pu at full speed at {x['at']:.4g} s and stays there to the last "
-        f"digit for {x['length']:.3g} s: does the recorder's range end there? Give a recording with a wider range, or "
-        "the part before, with " + Option.STOP
-    )
-
-
-def _magnitude(x: Figures) -> str:
-    return (
-        f"{x['column']!r} never falls below zero, where the model's comes to {x['least']:.3g} pu; without the sign the "
-        f"error falls from {x['error']:.3g} to {x['left']:.3g} pu (rms): was a magnitude recorded? Give the column "
-        "with the sign, as in " + Option.CHANNEL + f" '{x['role']}=COLUMN'"
-    )
-
-
-def _clocks(x: Figures) -> str:
-    late = "after" if x["delay"] > 0 else "before"
-    both = " by the same time" if x["together"] > 1 else ""
-    comes = "come" if "and" in x["which"] else "comes"
-    return (
-        f"{x['which']} {comes} {1000 * abs(x['delay']):.3g} ms {late} the model's{both}, and without that the error "
-        f"falls from {x['error']:.3g} to {x['left']:.3g} pu (rms): do the clocks of voltage and power "
-        "differ, or has the plant a delay that the model lacks? gfor shifts nothing"
-    )
-
-
 def _meter_elsewhere(x: Figures) -> str:
     side = "the grid's side" if x["reactance"] > 0 else "the device's side"
     meters = {"": "the meter", "V": "the meter of the voltage alone", "PQ": "that of P and Q alone"}
     given = f"X {x['reactance']:.3g}" + (f" of {x['of']}" if x["of"] else "")
     return (
         f"is {meters[x['of']]} at {side} of a transformer that the model does not hold? With a reactance of "
-        f"{abs(x['reactance']):.3g} pu between meter and port the error falls from {x['error']:.3g} to {x['left']:.3g} "
-        f"pu (rms). If it is so, give its own, such as --transformer '{given}'; if not, a reactance "
-        "of the model is wrong"
+        f"{abs(x['reactance']):.3g} pu between meter and port {fall_of_error(x)}. If it is so, give its own, such as "
+        f"--transformer '{given}'; if not, a reactance of the model is wrong"
     )
 
 
@@ -414,39 +187,14 @@ def _short_before(x: Figures) -> str:
     )
 
 
-_SENTENCES: Mapping[QuestionKind, Callable[[Figures], str]] = {
-    QuestionKind.VOLTAGE_LEVEL: _voltage_level,
-    QuestionKind.RATING: _rating,
-    QuestionKind.RATED_FREQUENCY: _rated_frequency,
-    QuestionKind.ANGLE_UNIT: _angle_unit,
-    QuestionKind.ANGLE_HELD: _angle_held,
-    QuestionKind.ANGLE_AND_FREQUENCY: _angle_and_frequency,
-    QuestionKind.FREQUENCY_ALONE: _frequency_alone,
-    QuestionKind.PHASE_ORDER: _phase_order,
-    QuestionKind.TIME_UNIT: _time_unit,
+_SENTENCES: Mapping[QuestionKind, Sentence] = {
+    **RECORDER_SENTENCES,
     QuestionKind.BASES_ASSUMED: _bases_assumed,
     QuestionKind.NO_STEADY_STATE: _no_steady_state,
     QuestionKind.NO_EVENT: _no_event,
-    QuestionKind.SLOW_SAMPLES: _slow_samples,
     QuestionKind.DOUBT_UNKNOWN: _doubt_unknown,
-    QuestionKind.MISSING: _missing,
-    QuestionKind.FILLED: _filled,
-    QuestionKind.UNMEASURED: _unmeasured,
-    QuestionKind.GAP_AT_EVENT: _gap_at_event,
-    QuestionKind.LOST_JUMP: _lost_jump,
-    QuestionKind.LOST_STEP: _lost_step,
-    QuestionKind.ANGLE_JUMP: _angle_jump,
-    QuestionKind.STORED_TWICE: _stored_twice,
-    QuestionKind.LAGGED: _lagged,
     QuestionKind.PLANT_OUT_OF_STEP: _plant_out_of_step,
     QuestionKind.START: _start,
-    QuestionKind.READ_OTHERWISE: _read_otherwise,
-    QuestionKind.POWER_HELD: _power_held,
-    QuestionKind.STUCK: _stuck,
-    QuestionKind.SPIKE: _spike,
-    QuestionKind.CLIPPED: _clipped,
-    QuestionKind.MAGNITUDE: _magnitude,
-    QuestionKind.CLOCKS: _clocks,
     QuestionKind.METER_ELSEWHERE: _meter_elsewhere,
     QuestionKind.SETPOINT: _setpoint,
     QuestionKind.OUT_OF_STEP: _out_of_step,
