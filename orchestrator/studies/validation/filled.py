@@ -14,6 +14,8 @@ Mask = NDArray[np.bool_]
 _FEWEST = 4  # repeated samples in a row
 _BESIDE = 10  # samples before and after that have to move
 _MOVING = 8  # so many of these
+_STEPS = 4.0  # of a channel's resolution, by which it goes on after samples that were held
+_JUMPS = 1.5  # times the largest change beside a run of still samples, by which it ends in a jump
 _ROUNDING = (
     1e-11  # of the largest value: what a simulation at rest moves by, and no recorder resolves
 )
@@ -38,6 +40,35 @@ def filled_samples(columns: Sequence[Numbers]) -> Mask:
         if high - low >= _FEWEST and moves and chance < _BY_CHANCE:
             found[low + 1 : high + 1] = True
     return found
+
+
+def held_alone(values: Numbers) -> Mask:
+    """Return which samples of one channel repeat the one before, between samples that move.
+
+    A coarse one repeats them where it turns, and goes on by one step of its resolution. One whose range ends repeats
+    them at that end, and goes on from there as the plant does; one that held them jumps."""
+    found = filled_samples([values])
+    if not found.any():
+        return found
+    known = np.unique(values[np.isfinite(values)])
+    apart = np.diff(known)
+    resolution = float(apart[apart > _ROUNDING * np.abs(known).max()].min())
+    for low, high in runs_of(found):
+        goes_on = abs(values[high] - values[low])
+        at_end = values[low] in (known[0], known[-1])
+        is_coarse = goes_on < _STEPS * resolution
+        if is_coarse or (at_end and not _jumps_after(values, low, high)):
+            found[low:high] = False
+    return found
+
+
+def _jumps_after(values: Numbers, low: int, high: int) -> bool:
+    """Return whether a channel leaves a run of still samples faster than it moves beside it."""
+    changes = np.abs(np.diff(values))
+    beside = np.concatenate(
+        [changes[max(0, low - 1 - _BESIDE) : low - 1], changes[high:][:_BESIDE]]
+    )
+    return bool(changes[high - 1] > _JUMPS * np.nanmax(beside, initial=0.0))
 
 
 def moves_in(values: Numbers) -> Mask:

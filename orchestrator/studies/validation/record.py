@@ -23,7 +23,7 @@ from orchestrator.studies.validation.angle_questions import (
 from orchestrator.studies.validation.averaging import averaged
 from orchestrator.studies.validation.channels import RecordedChannel, channels_in, in_base, unit_of
 from orchestrator.studies.validation.clipped import clipped_run
-from orchestrator.studies.validation.filled import Mask, filled_samples, runs_of
+from orchestrator.studies.validation.filled import Mask, filled_samples, held_alone, runs_of
 from orchestrator.studies.validation.held_power import held_power
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.stored_twice import stored_twice
@@ -231,6 +231,12 @@ class _Reading:
         if "time" in channels:
             self.times = self._values("time")[0]
         self.questions: list[Question] = []
+        # which samples of P or Q a recorder held, whatever it did with the other
+        self.held = {
+            role: held_alone(np.asarray(dataset[channels[role].column].values, dtype=float))
+            for role in ("p", "q")
+            if role in channels
+        }
         if len(self.times) < _FEWEST:
             raise InputError(
                 f"{label}: it has {len(self.times)} samples; at least {_FEWEST} are compared"
@@ -254,7 +260,16 @@ class _Reading:
             for role, one in self.channels.items()
             if role in roles
         ]
-        return filled_samples(columns) if columns else np.zeros(len(self.times), dtype=bool)
+        found = filled_samples(columns) if columns else np.zeros(len(self.times), dtype=bool)
+        for role, held in self.held.items():
+            if role in roles:
+                found |= held
+        return found
+
+    @property
+    def held_columns(self) -> list[str]:
+        """The columns of P and Q of which a recorder held samples."""
+        return [self.channels[role].column for role, held in self.held.items() if held.any()]
 
     def ask_of_samples(self) -> None:
         """Ask about a channel that never moves, and about one sample that stands alone."""
@@ -277,13 +292,15 @@ class _Reading:
             if held is not None:
                 figures = {"role": role, "column": column, "count": held.count}
                 self.ask(QuestionKind.POWER_HELD, usual=held.usual, longest=held.longest, **figures)
-            run = clipped_run(value) if role in ("p", "q") else None
+            own = known & ~self.held[role] if role in self.held else known
+            moved, when = values[own], self.times[own]
+            run = clipped_run(moved) if role in ("p", "q") else None
             if run is not None:
                 low, high = run
-                figures = {"role": role, "column": column, "at": float(times[low])}
+                figures = {"role": role, "column": column, "at": float(when[low])}
                 figures |= {
-                    "value": float(value[low]),
-                    "length": float(times[high - 1] - times[low]),
+                    "value": float(moved[low]),
+                    "length": float(when[high - 1] - when[low]),
                 }
                 self.ask(QuestionKind.CLIPPED, **figures)
             before, after = value[1:-1] - value[:-2], value[1:-1] - value[2:]
@@ -497,7 +514,9 @@ def _evened(reading: _Reading, voltage: Complex, power: Complex) -> Recording:
     missing = int((~(drives if is_long else good)).sum())
     if stale:
         at = float(times[np.flatnonzero(filled[0][part] | filled[1][part])[0]])
-        reading.ask(QuestionKind.FILLED, count=stale, of=len(even), at=at, longest=longest)
+        alone = [] if filled[0].any() else reading.held_columns
+        figures = {"count": stale, "of": len(even), "at": at, "longest": longest, "columns": alone}
+        reading.ask(QuestionKind.FILLED, **figures)
     elif missing:
         reading.ask(QuestionKind.MISSING, count=missing, of=len(even), longest=longest)
     recording = Recording(

@@ -120,9 +120,11 @@ def _unmeasured(x: Figures) -> str:
 
 
 def _filled(x: Figures) -> str:
+    whose = f" of {' and '.join(map(repr, x['columns']))}" if x["columns"] else ""
+    bridged = "" if x["columns"] else "bridged in the voltage and "
     return (
-        f"{x['count']} samples stand still while those before and after move, from {x['at']:.4g} s on: the recorder "
-        "filled a gap with the last value. They are taken as missing: bridged in the voltage and not compared"
+        f"{x['count']} samples{whose} stand still while those before and after move, from {x['at']:.4g} s on: the "
+        f"recorder filled a gap with the last value. They are taken as missing: {bridged}not compared"
     )
 
 
