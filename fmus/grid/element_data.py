@@ -14,7 +14,8 @@ class Line:
     ``tap``·e^{j·``shift``} is an ideal ratio at the from side, ``shift`` in rad: MATPOWER's convention, in which
     series impedance and charging lie behind the ratio. ``X_C`` is the reactance of a capacitor in series [pu, 100 MVA].
     ``adjustable``: whether the ratio may move, so that it is a parameter also where it is 1 at first; ``has_ends``:
-    whether each end has a breaker of its own; ``faulted``: whether there can be a fault along it."""
+    whether each end has a breaker of its own; ``has_poles``: whether one phase alone may open at an end;
+    ``faulted``: whether there can be a fault along it."""
 
     name: str
     from_bus: str
@@ -27,12 +28,13 @@ class Line:
     X_C: float = 0.0
     adjustable: bool = False
     has_ends: bool = False
+    has_poles: bool = False
     faulted: bool = False
 
     @property
     def is_plain(self) -> bool:
         """Return whether it is a series impedance and nothing else between its buses."""
-        return not (self.has_ends or self.faulted)
+        return not (self.has_ends or self.has_poles or self.faulted)
 
     @property
     def has_ratio(self) -> bool:

@@ -9,7 +9,13 @@ with y_a = y/d, y_b = y/(1 − d) and S = y_a + y_b + y_f,
 and without one y, −y, y. An end that is open carries no current: it is eliminated as well, and the line stays charged
 from the other end.
 
-    i_from = c_f·((A − (1 − c_t)·B²/D)·v_f + c_t·B·v_t)    i_to = c_t·(c_f·B·v_f + (D − (1 − c_f)·B²/A)·v_t)"""
+    i_from = c_f·((A − (1 − c_t)·B²/D)·v_f + c_t·B·v_t)    i_to = c_t·(c_f·B·v_f + (D − (1 − c_f)·B²/A)·v_t)
+
+One phase that opens at an end is an impedance z in series there, which the positive sequence meets: of the from end
+
+    A ← A/(1 + z·A)    B ← B/(1 + z·A)    D ← D − z·B²/(1 + z·A)
+
+and of the to end with A and D exchanged. There is no fault along the line meanwhile."""
 
 from dataclasses import dataclass
 
@@ -18,6 +24,7 @@ from fmus.grid.fault import fault_admittance
 from fmus.grid.network import OPEN_CHARGING, Line
 from fmus.toolchain.frames import ZERO, Phasor
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.port_variables import SYSTEM_BASE
 from fmus.toolchain.symbols import Scalar
 
 _NEAREST = 1e-3
@@ -67,15 +74,19 @@ class LineParts:
 
 
 def declare_line_parts(m: ModelBuilder, line: Line, values: LineValues, y: Phasor) -> LineParts:
-    """Declare the switches of the ends and the fault of a line; ``y``: its series admittance, 0 where it is open."""
+    """Declare the switches of the ends, the poles and the fault of a line; ``y``: its series admittance, 0 where it is
+    open."""
     jb = Phasor(0.0, 0.0)
     if values.B is not None:
         jb = Phasor(0.0, values.B / 2 * (1 - OPEN_CHARGING) * values.connected)
     ends: tuple[Scalar, Scalar] = (1.0, 1.0)
     if line.has_ends:
         ends = _end(m, line, "from", line.from_bus), _end(m, line, "to", line.to_bus)
+    poles = (ZERO, ZERO)
+    if line.has_poles:
+        poles = _pole(m, line, "from", line.from_bus), _pole(m, line, "to", line.to_bus)
     if not line.faulted:
-        return LineParts(y + jb, -y, y + jb, jb, ends)
+        return LineParts(*_behind_poles(y + jb, -y, y + jb, poles), jb, ends)
     at = m.parameter(
         line.variable("fault.at"),
         0.5,
@@ -91,9 +102,42 @@ def declare_line_parts(m: ModelBuilder, line: Line, values: LineValues, y: Phaso
     A = y / at - y * share * ((1 - at) / at)
     D = y / (1 - at) - y * share * (at / (1 - at))
     way = share * (1 - at), share * at
-    return LineParts(A + jb, -(y * share), D + jb, jb, ends, way=way, fault=y_f)
+    behind = _behind_poles(A + jb, -(y * share), D + jb, poles)
+    return LineParts(*behind, jb, ends, way=way, fault=y_f)
+
+
+def _behind_poles(
+    A: Phasor, B: Phasor, D: Phasor, poles: tuple[Phasor, Phasor]
+) -> tuple[Phasor, Phasor, Phasor]:
+    """Return the admittances with an impedance in series at each end."""
+    one = Phasor(1.0, 0.0)
+    at_from, at_to = poles
+    if at_from is not ZERO:
+        part = one / (one + A * at_from)
+        A, B, D = A * part, B * part, D - B * B * at_from * part
+    if at_to is not ZERO:
+        part = one / (one + D * at_to)
+        A, B, D = A - B * B * at_to * part, B * part, D * part
+    return A, B, D
 
 
 def _end(m: ModelBuilder, line: Line, side: str, bus: str) -> Scalar:
     text = f"Line {line.name} is closed at {bus}"
     return m.switch(line.variable(f"{side}_connected"), True, text, tunable=True)
+
+
+def _pole(m: ModelBuilder, line: Line, side: str, bus: str) -> Phasor:
+    """Declare what the positive sequence meets in series at an end; 0 while all three phases are closed."""
+    text = f"that the positive sequence meets at {bus} while one phase of line {line.name} is open there"
+    R, X = (
+        m.parameter(
+            line.variable(f"{side}_pole.{part}"),
+            0.0,
+            "pu",
+            f"{name} {text}",
+            base=SYSTEM_BASE,
+            tunable=True,
+        )
+        for part, name in (("R", "Resistance"), ("X", "Reactance"))
+    )
+    return Phasor(R, X)

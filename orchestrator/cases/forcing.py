@@ -39,7 +39,7 @@ _FORMS = {
         ),
         "'PLACE, DURATION', such as 'bus_9, 150 ms' or 'line_7_9 at 30 %, 100 ms'; the phases ('1-phase', '2-phase', "
         "'2-phase-earth'), what clears it ('opens line_7_9'; along a line 'opens it' or 'opens one pole'; at one end "
-        "alone 'opens line_7_9 at bus_7' or 'opens it at bus_7'; and 'recloses after 500 ms')",
+        "alone 'opens line_7_9 at bus_7', 'opens it at bus_7', 'opens one pole at bus_7'; and 'recloses after 500 ms')",
     ),
 }
 """Option → what it asks for, its form, and that in words."""

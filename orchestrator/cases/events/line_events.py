@@ -178,7 +178,7 @@ def _ask_whether_transformer(draft: Draft, line: Line, where: str) -> None:
 def _pole(
     draft: Draft, table: schema.LineFaultTable, at: tuple[str, str], times: tuple[float, float]
 ) -> list[Event]:
-    """Return the opening and the closing of one phase of a line."""
+    """Return the opening and the closing of one phase of a line, at one of its ends or at both."""
     grid, where = at
     line = _line(draft, table.line)
     plan = draft.system.components.get(grid)
@@ -190,6 +190,12 @@ def _pole(
             f"{table.line} has a ratio: one of its phases cannot open alone; write opens = 'line'",
         )
         return []
+    if table.opens_at is not None:
+        side = _side(draft, line, table.opens_at, where)
+        if side is None:
+            return []
+        opened = coupled.PoleEndSwitching(times[0], grid, table.line, side)
+        return [opened, replace(opened, time=times[1], open=False)]
     X, R = plan.number(line.variable("X")), plan.number(line.variable("R"))
     return [
         coupled.PoleSwitching(time, grid, table.line, X, R, open=is_open)

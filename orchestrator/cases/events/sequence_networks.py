@@ -8,7 +8,7 @@ question."""
 import math
 from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from fmus.grid.element_data import Line
 from fmus.grid.network import Network
@@ -44,15 +44,17 @@ from orchestrator.cases.networks.transformer_kinds import is_known_transformer
 from orchestrator.systems.coupling.system import ComponentPlan
 
 FAULT = "the fault's place"
-"""Bus of a sequence network at a fault along a line."""
+"""Bus of a sequence network at a fault along a line, or at the end of a line that is away from its own bus."""
 
 
 @dataclass(frozen=True)
 class Changed:
-    """The line of a fault or an open pole: it is split at a part of the way, or its series impedance is open."""
+    """The line of a fault or an open pole: it is split at a part of the way, or its series impedance is open, or one of
+    its ends, ``"from"`` or ``"to"``, is away from its bus."""
 
     line: str = ""
     at: float | None = None
+    end: str | None = None
 
 
 @dataclass
@@ -76,12 +78,12 @@ class SequenceAssembly:
         self.table = table.sequences if table else SequencesTable()
         self.data = (self.draft.data.sequences if self.draft.data else None) or SequenceData()
         buses = [*self.flow.voltages]
-        if self.changed.at is not None:
+        if self.changed.at is not None or self.changed.end is not None:
             buses.append(FAULT)
         self.negative, self.zero = SequenceNetwork(buses), SequenceNetwork([*buses])
         self._lines = {line.name: line for line in network.lines}
         for branch in self.flow.lines:
-            self._add_branch(branch)
+            self._add_branch(self._as_left(branch))
         self._couple()
         self._add_loads_and_shunts()
         for port in network.ports:
@@ -93,6 +95,14 @@ class SequenceAssembly:
         """Return the series impedances of a line in both sequences [pu, 100 MVA]."""
         branch = next(x for x in self.flow.lines if x.name == name)
         return self._impedance(branch), self._zero_line(branch, self._lines[name]).z
+
+    def _as_left(self, branch: FlowLine) -> FlowLine:
+        """Return a branch with the end that is away from its bus at a bus of its own."""
+        if branch.name != self.changed.line or self.changed.end is None:
+            return branch
+        if self.changed.end == "from":
+            return replace(branch, from_bus=FAULT)
+        return replace(branch, to_bus=FAULT)
 
     def _holds(self, switch: str) -> bool:
         return bool(self.values.get(switch, True))
@@ -143,7 +153,8 @@ class SequenceAssembly:
         ratio: complex,
     ) -> None:
         """Add a π section, or what of it is still joined to a bus."""
-        half, is_changed = 0.5j * B, branch.name == self.changed.line
+        half = 0.5j * B
+        is_changed = branch.name == self.changed.line and self.changed.end is None
         ends = (branch.from_bus, abs(ratio) ** 2), (branch.to_bus, 1.0)
         for (bus, square), own, far in zip(ends, closed, reversed(closed), strict=True):
             if not own:

@@ -81,7 +81,7 @@ def _is_unbalanced(event: Event) -> bool:
     match event:
         case coupled.BusFault() | coupled.LineFault():
             return event.on and event.kind != "3-phase"
-        case coupled.PoleSwitching():
+        case coupled.PoleSwitching() | coupled.PoleEndSwitching():
             return event.open
     return False
 
@@ -99,7 +99,8 @@ class _Solver:
 
     def as_opened(self, event: Event) -> Event:
         """Return a pole's closing, or that of the whole line where the whole line has opened."""
-        if not isinstance(event, coupled.PoleSwitching) or event.line not in self._whole:
+        poles = coupled.PoleSwitching | coupled.PoleEndSwitching
+        if not isinstance(event, poles) or event.line not in self._whole:
             return event
         self._whole.discard(event.line)
         return coupled.LineSwitching(event.time, event.component, event.line, True)
@@ -123,6 +124,8 @@ class _Solver:
                 return replace(event, R=z.real, X=z.imag)
             case coupled.PoleSwitching():
                 return self._open_pole(event, values)
+            case coupled.PoleEndSwitching():
+                return self._open_pole_at_end(event, values)
         return event
 
     def _open_pole(self, event: coupled.PoleSwitching, values: Mapping[str, object]) -> Event:
@@ -140,6 +143,31 @@ class _Solver:
         R, X = own[0].real + z.real, own[0].imag + line.X_C + z.imag
         if _is_finite(z) and abs(complex(R, X)) < _OPEN:
             return replace(event, R=R, X=X)
+        return self._open_whole(event, negative, zero)
+
+    def _open_pole_at_end(
+        self, event: coupled.PoleEndSwitching, values: Mapping[str, object]
+    ) -> Event:
+        """Return an event with what stands between a line's end and its bus, of which one phase is open."""
+        network = self._draft.network
+        assert network is not None
+        line = next(x for x in network.lines if x.name == event.line)
+        bus = line.from_bus if event.end == "from" else line.to_bus
+        found = self._assembled(values, Changed(event.line, end=event.end), "1-phase", bus)
+        negative, zero = (x.between(bus, FAULT) for x in (found.negative, found.zero))
+        z = _parallel(negative, zero)
+        self._keep(event, f"{event.line} at {bus}", "open pole", (negative, zero, z), found)
+        if _is_finite(z) and abs(z) < _OPEN:
+            return replace(event, R=z.real, X=z.imag)
+        return self._open_whole(event, negative, zero)
+
+    def _open_whole(
+        self,
+        event: coupled.PoleSwitching | coupled.PoleEndSwitching,
+        negative: complex,
+        zero: complex,
+    ) -> Event:
+        """Return the opening of all phases where two of them carry next to nothing, which is asked about."""
         self._whole.add(event.line)
         text = (
             f"with one phase of {event.line} open its other phases carry next to nothing (Z2 = "
@@ -176,7 +204,7 @@ class _Solver:
     ) -> None:
         negative, zero, seen = (z if _is_finite(z) else None for z in impedances)
         own = complex(getattr(event, "R", 0.0), getattr(event, "X", 0.0))
-        own = 0j if isinstance(event, coupled.PoleSwitching) else own
+        own = 0j if kind == "open pole" else own
         source = found.data.source
         if source and found.read:
             source = f"{', '.join(sorted(found.read))} of {source}"

@@ -492,8 +492,6 @@ class LineFaultTable(FaultBase):
             raise ValueError(
                 "'opens_at' needs 'opens': 'line' or 'pole', which opens at this bus alone"
             )
-        if self.opens == "pole" and self.opens_at is not None:
-            raise ValueError("'opens_at' is for opens = 'line': one pole opens at both ends")
         if self.opens == "pole" and (self.kind != "1-phase" or self.reclose_after is None):
             raise ValueError(
                 "opens = 'pole' is for a fault of kind '1-phase', and needs 'reclose_after': the dead time"

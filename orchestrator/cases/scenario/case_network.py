@@ -266,7 +266,7 @@ def _line_with_end(table: EventTable) -> str | None:
     match table:
         case LineTripTable(at=str()):
             return table.line
-        case LineFaultTable(opens_at=str()):
+        case LineFaultTable(opens="line", opens_at=str()):
             return table.line
         case BusFaultTable(opens_at=str()):
             return table.cleared_by
@@ -277,12 +277,19 @@ def _with_line_parts(
     network: Network, tables: Sequence[EventTable], line_ends: frozenset[str]
 ) -> Network:
     """The network with lines whose ends switch one by one, and with faults along lines."""
-    faulted = {table.line for table in tables if isinstance(table, LineFaultTable)}
+    along = [table for table in tables if isinstance(table, LineFaultTable)]
+    faulted = {table.line for table in along}
+    poles = {table.line for table in along if table.opens == "pole" and table.opens_at is not None}
     ends = line_ends | {*filter(None, map(_line_with_end, tables))}
-    if not (faulted | ends):
+    if not (faulted | ends):  # a line with poles is among the faulted
         return network
     lines = tuple(
-        replace(line, faulted=line.name in faulted, has_ends=line.name in ends)
+        replace(
+            line,
+            faulted=line.name in faulted,
+            has_ends=line.name in ends,
+            has_poles=line.name in poles,
+        )
         for line in network.lines
     )
     return replace(network, lines=lines, phasors=True)

@@ -35,8 +35,12 @@ def modes_after(
     if not values or prepared.beside is None:
         return None
     shared = [key for key in values if key.endswith(".scale") or ".delta_" in key]
+    poles = [key for key in values if key.endswith(("_pole.R", "_pole.X"))]
     if shared:
         reason = f"units share what {shared[0]} changes by what their controls do"
+    elif poles:
+        line = poles[0].rpartition(".")[0].rpartition(".")[0]
+        return f"the modes after the events are not known: one phase of {line} is open at an end"
     else:
         try:
             after = prepared.beside(prepared.name, False, values, prepared.stop_time)

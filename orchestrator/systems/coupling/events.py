@@ -130,6 +130,23 @@ class PoleSwitching(BranchChange):
 
 
 @dataclass(frozen=True, slots=True)
+class PoleEndSwitching(Event):
+    """One of a line's three phases opens at one end alone, or closes again.
+
+    R + jX [pu, 100 MVA] is what the positive sequence meets between the line and its bus then."""
+
+    line: str
+    end: Literal["from", "to"]
+    R: float = 0.0
+    X: float = 0.0
+    open: bool = True
+
+    def settings(self) -> Mapping[str, float | bool]:
+        pole = line_variable(self.line, f"{self.end}_pole")
+        return {f"{pole}.R": self.R, f"{pole}.X": self.X}
+
+
+@dataclass(frozen=True, slots=True)
 class BusFault(Event):
     """A fault at a bus begins, or ends.
 
