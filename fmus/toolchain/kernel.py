@@ -10,7 +10,7 @@ z = [p | c | u | x | y | ẋ]. A kernel is these functions on it:
   index of the first state that is no longer finite;
 - ``requirements(z, w, r)``: the model may run where every r > 0.
 
-``workspace_size()`` tells how many numbers of its own, w, an instance needs between calls.
+``workspace_size()`` tells how many numbers of its own, w, an instance needs between calls; they are 0 at first.
 
 `tape` writes the same functions as data."""
 
@@ -19,6 +19,7 @@ from itertools import chain, islice
 from pathlib import Path
 
 from fmus.toolchain.elimination_plan import plan_elimination
+from fmus.toolchain.fixed_values import with_fixed_apart
 from fmus.toolchain.model import Model
 from fmus.toolchain.symbols import Expr, Function, jtimes, jtimes_transposed, symbols
 from fmus.toolchain.symbols.operations import C, Op
@@ -50,13 +51,21 @@ def c_source(model: Model, further: Mapping[str, Function] | None = None) -> str
     """The whole C kernel of a model as one translation unit.
 
     ``further``: Functions by name whose code is wanted beside the kernel's own."""
-    functions = kernel_functions(model)
+    apart = with_fixed_apart(model)
+    functions = {
+        "initialise": model.initialise,
+        "fixed": apart.fixed,
+        "outputs": apart.outputs,
+        "derivatives": apart.derivatives,
+        "requirements": model.requirements,
+    }
     sizes = {
         "NP": len(model.parameters),
         "NC": len(model.calculated),
         "NU": len(model.inputs),
         "NX": len(model.states),
         "NY": len(model.outputs),
+        "NH": apart.count,
     }
     tables = ""
     if model.integrator == "sdirk":
@@ -79,8 +88,12 @@ def c_source(model: Model, further: Mapping[str, Function] | None = None) -> str
     parts += [
         (_C / name).read_text(encoding="utf-8") for name in ("kernel.c", f"{model.integrator}.c")
     ]
-    kept = "IMPLICIT_SIZE" if model.integrator == "sdirk" else "0"
-    return "\n".join([*parts, f"KERNEL int workspace_size(void) {{ return {kept}; }}", ""])
+    size = "OWN + IMPLICIT_SIZE" if model.integrator == "sdirk" else "OWN"
+    parts += [
+        f"enum {{ WORKSPACE = {size} }};",
+        "KERNEL int workspace_size(void) { return WORKSPACE; }",
+    ]
+    return "\n".join([*parts, ""])
 
 
 def _tables(lists: Mapping[str, list[int]]) -> str:

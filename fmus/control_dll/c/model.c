@@ -61,11 +61,11 @@ static int32_t follow_parameters(struct dll_instance *s, double *z) {
     return SAID_NOTHING;
 }
 
-static int32_t give_outputs(struct dll_instance *s, double *z) {
+static int32_t give_outputs(struct dll_instance *s, double *z, double *w) {
     memcpy(z + U, s->inputs, NU * sizeof *z);
     for (int i = 0; i < NU; ++i)
         if (!isfinite(z[U + i])) return fails(s, INPUT_NOT_FINITE[i]);
-    outputs(z, NULL);
+    outputs(z, w);
     memcpy(s->outputs, z + Y, NY * sizeof *z);
     return SAID_NOTHING;
 }
@@ -92,33 +92,34 @@ EXPORT int32_t CALLED Model_CheckParameters(struct dll_instance *s) {
 /* Computes the state of the operating point. May be repeated while a host holds the model at its start: what turns with
    the network frame then turns on with the time. */
 EXPORT int32_t CALLED Model_Initialize(struct dll_instance *s) {
-    double z[NV] = {0}, rate[NX];
+    double z[NV] = {0}, rate[NX], w[WORKSPACE] = {0};
     s->ints[READY] = 0;
     if (Model_CheckParameters(s)) return SAID_ERROR;
     take_parameters(s, z);
     initialise(z, NULL);
     memcpy(z + U, s->inputs, NU * sizeof *z);
-    if (NS) rates(z, z + X, rate, NULL);
+    enter(z, w);
+    if (NS) rates(z, z + X, rate, w);
     for (int i = 0; i < NS; ++i) z[X + STEPWISE[i]] += rate[STEPWISE[i]] * s->time;
     for (int i = 0; i < NX; ++i)
         if (!isfinite(z[X + i])) return fails(s, NO_START);
     memcpy(s->doubles, z + X, NX * sizeof *z);
     mark(z, 1, s->ints + FIXED_MARK);
     mark(z, 0, s->ints + ALL_MARK);
-    if (give_outputs(s, z)) return SAID_ERROR;
+    if (give_outputs(s, z, w)) return SAID_ERROR;
     s->ints[READY] = 1;
     return SAID_NOTHING;
 }
 
 /* Outputs from the state and the inputs of this sample; then the state of the next one. */
 EXPORT int32_t CALLED Model_Outputs(struct dll_instance *s) {
-    double z[NV];
+    double z[NV], w[WORKSPACE] = {0};
     if (!s->ints[READY]) return fails(s, NOT_STARTED);
     if (follow_parameters(s, z)) return SAID_ERROR;
     memcpy(z + X, s->doubles, NX * sizeof *z);
-    if (give_outputs(s, z)) return SAID_ERROR;
+    if (give_outputs(s, z, w)) return SAID_ERROR;
     const int parts = (int)ceil(SAMPLE_TIME / z[INTERNAL_STEP] - 1e-9), n = parts > 1 ? parts : 1;
-    const int bad = advance(z, SAMPLE_TIME / n, n, NULL);
+    const int bad = advance(z, SAMPLE_TIME / n, n, w);
     if (bad) return fails(s, STATE_NOT_FINITE[bad - 1]);
     memcpy(s->doubles, z + X, NX * sizeof *z);
     return SAID_NOTHING;

@@ -11,12 +11,23 @@
 #ifndef KERNEL /* a native FMU keeps these functions to itself */
 #define KERNEL EXPORT
 #endif
-enum { OWN = 0, C = NP, U = C + NC, X = U + NU, Y = X + NX, DX = Y + NY };
+enum { C = NP, U = C + NC, X = U + NU, Y = X + NX, DX = Y + NY };
+/* A workspace begins with the p and c that its NH fixed values were made of, once there are any, and these values. */
+enum { MADE_OF = 1, AT_FIXED = MADE_OF + U, OWN = AT_FIXED + NH };
+
+/* Compute what p and c fix, where they are not as they were. Bytes are compared: a NaN is equal to itself. */
+static void enter(const double *z, double *workspace) {
+    if (workspace[0] && !memcmp(workspace + MADE_OF, z, U * sizeof *z)) return;
+    const double *arg[] = {z, z + C};
+    double *res[] = {workspace + AT_FIXED};
+    fixed_code(arg, res);
+    memcpy(workspace + MADE_OF, z, U * sizeof *z);
+    workspace[0] = 1;
+}
 
 static void rates(const double *z, const double *x, double *rate, double *workspace) {
-    const double *arg[] = {x, z + U, z, z + C};
+    const double *arg[] = {x, z + U, z, z + C, workspace + AT_FIXED};
     double *res[] = {rate};
-    (void)workspace;
     derivatives_code(arg, res);
 }
 
@@ -27,14 +38,21 @@ KERNEL void initialise(double *z, double *workspace) {
     initialise_code(arg, res);
 }
 
-KERNEL void outputs(double *z, double *workspace) {
-    (void)workspace;
-    const double *arg[] = {z + X, z + U, z, z + C};
+static void read_outputs(double *z, const double *workspace) {
+    const double *arg[] = {z + X, z + U, z, z + C, workspace + AT_FIXED};
     double *res[] = {z + Y};
     outputs_code(arg, res);
 }
 
-KERNEL void derivatives(double *z, double *workspace) { rates(z, z + X, z + DX, workspace); }
+KERNEL void outputs(double *z, double *workspace) {
+    enter(z, workspace);
+    read_outputs(z, workspace);
+}
+
+KERNEL void derivatives(double *z, double *workspace) {
+    enter(z, workspace);
+    rates(z, z + X, z + DX, workspace);
+}
 
 KERNEL void requirements(const double *z, double *workspace, double *r) {
     (void)workspace;
@@ -47,7 +65,7 @@ KERNEL void requirements(const double *z, double *workspace, double *r) {
 static int finish(double *z, double *workspace) {
     for (int i = 0; i < NX; ++i)
         if (!isfinite(z[X + i])) return i + 1;
-    outputs(z, workspace);
+    read_outputs(z, workspace);
     return 0;
 }
 

@@ -1,5 +1,5 @@
-/* Classical Runge-Kutta of order 4; it keeps nothing. The NS stepwise states (indices STEPWISE) are held until the end of
-   the communication step and then move by their rate at its beginning. */
+/* Classical Runge-Kutta of order 4; it keeps nothing of its own. The NS stepwise states (indices STEPWISE) are held until
+   the end of the communication step and then move by their rate at its beginning. */
 static void held_rates(const double *z, const double *x, double *rate, double *w) {
     rates(z, x, rate, w);
     for (int i = 0; i < NS; ++i) rate[STEPWISE[i]] = 0;
@@ -7,6 +7,7 @@ static void held_rates(const double *z, const double *x, double *rate, double *w
 
 KERNEL int advance(double *z, double h, int n, double *w) {
     double k1[NX + 1], k2[NX + 1], k3[NX + 1], k4[NX + 1], t[NX + 1], *x = z + X, moved[NS + 1];
+    enter(z, w);
     if (NS) {
         rates(z, x, k1, w);
         for (int i = 0; i < NS; ++i) moved[i] = n * h * k1[STEPWISE[i]];

@@ -304,6 +304,5 @@ TAPE void requirements(const double *z, double *w, double *margins) {
 }
 
 TAPE int advance(double *z, double h, int n, double *w) {
-    enter(z, w);
     return OF(w)->size.implicit ? advance_implicitly(z, h, n, w) : advance_explicitly(z, h, n, w);
 }

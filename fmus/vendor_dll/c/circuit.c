@@ -15,7 +15,8 @@ static double angle_at(const struct instance *s, double time) {
 
 static void circuit_refresh(struct instance *s, double time) {
     s->circuit[AT_ANGLE] = angle_at(s, time);
-    circuit_outputs(s->circuit, NULL);
+    double room[WORKSPACE] = {0};
+    circuit_outputs(s->circuit, room);
     s->old = 0;
 }
 
@@ -31,7 +32,7 @@ static int circuit_advance(struct instance *s, double from, double to) {
     const double length = to - from, shortest = 1e-6 * (SAMPLE_TIME > 0 ? SAMPLE_TIME : length);
     if (length <= shortest) return OK;
     const int parts = (int)ceil(length / s->circuit[AT_INTERNAL_STEP] - 1e-6);
-    double room[1] = {0};
+    double room[WORKSPACE] = {0};
     s->circuit[AT_ANGLE] = angle_at(s, from);
     if (circuit_advance_parts(s->circuit, length / (parts > 1 ? parts : 1), parts > 1 ? parts : 1, room))
         return say(s, ERROR, "the circuit's states are no longer finite after t = %.9g s", from);
