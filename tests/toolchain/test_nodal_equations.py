@@ -246,3 +246,28 @@ def test_voltages_that_are_kept_are_those_at_the_point(seed):
         assert bytes(z) == bytes(alone), (act, asked)
         seen.add(bytes(z))
     assert len(seen) > 40
+
+
+@pytest.mark.parametrize("moved", ["states", "input", "both"])
+def test_what_was_solved_before_leaves_no_trace(models, moved):
+    """Where states alone move, only what they reach is solved anew: to the bits of a kernel that solves all."""
+    model = models["data"]
+    kernel, random = taped(model), np.random.default_rng(5)
+    first_state = len(model.parameters) + len(model.calculated) + len(model.inputs)
+    z = started(model, kernel)
+    kernel.outputs(z)
+    for turn in range(12):
+        if moved != "input":
+            for k in range(len(model.states)):
+                z[first_state + k] += 0.1 * random.standard_normal()
+        if moved != "states":
+            z[model.value_references["g2.e_im"]] = random.standard_normal()
+        fresh, alone = taped(model), vector(model)
+        alone[:] = z[:]
+        calls = ("derivatives", "outputs") if turn % 3 else ("outputs",)
+        for one, values in ((kernel, z), (fresh, alone)):
+            for call in calls:
+                getattr(one, call)(values)
+        assert bytes(z) == bytes(alone)
+    assert kernel.advance(z, 1e-3, 3) == fresh.advance(alone, 1e-3, 3) == 0
+    assert bytes(z) == bytes(alone)

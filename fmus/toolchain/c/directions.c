@@ -161,6 +161,7 @@ static void seed_voltages(double *w, double *seed) {
     compute(w, CURRENTS);
     take_seeds(w, CURRENTS, seed, 0, 2 * NB, back);
     move_back(w, CURRENTS, seed);
+    OF(w)->swept = NOTHING;
 }
 
 /* Everything that derivatives at z need, but for the sections that are asked for. Voltages are always solved for: a
@@ -168,7 +169,8 @@ static void seed_voltages(double *w, double *seed) {
 static void settle(double *w, const double *z) {
     enter(z, w);
     memcpy(SLOT + X, z + X, NX * sizeof *z);
-    if (NB) solve_nodes(w);
+    OF(w)->swept = NOTHING;
+    if (NB) solve_nodes(w, ALL);
 }
 
 /* Directions over all variables: what is known goes in, what follows comes out; with `start`, from the parameters on. */

@@ -8,7 +8,9 @@
 #define ELEMENTS (INVERSE + 2 * NB)
 #define SOUGHT (ELEMENTS + 2 * NM)
 #define CURRENT (SOUGHT + 2 * NB)
-#define NODAL_SIZE (CURRENT + 2 * NB - OWN)
+#define SWEPT (CURRENT + 2 * NB)
+#define REACH (SWEPT + 2 * NB)
+#define NODAL_SIZE (REACH + REACH_WORDS(*OF(w)) / 2 + 1 - OWN)
 
 /* What Y follows from is as it was when it was factorised. A large network's parameters take as long to compare as its
    factors to read; they are compared once after they were entered. */
@@ -22,30 +24,44 @@ static int unchanged(double *w) {
     return 1;
 }
 
+/* What is left of the current into a row after the rows above it. */
+static inline void sweep_row(const double *lu, const double *b, double *y, const struct tape *t, int i) {
+    const int32_t *col = t->col;
+    double re = b[t->perm[i]], im = b[t->size.buses + t->perm[i]];
+    for (int q = t->row[i]; q < t->diag[i]; ++q) {
+        re -= lu[2 * q] * y[2 * col[q]] - lu[2 * q + 1] * y[2 * col[q] + 1];
+        im -= lu[2 * q] * y[2 * col[q] + 1] + lu[2 * q + 1] * y[2 * col[q]];
+    }
+    y[2 * i] = re;
+    y[2 * i + 1] = im;
+}
+
+/* The solution of a row from those of the rows below it. */
+static inline void solve_row(const double *lu, const double *inverse, const double *y, double *s, const struct tape *t,
+                             int i) {
+    const int32_t *col = t->col;
+    double re = y[2 * i], im = y[2 * i + 1];
+    for (int q = t->diag[i] + 1; q < t->row[i + 1]; ++q) {
+        re -= lu[2 * q] * s[2 * col[q]] - lu[2 * q + 1] * s[2 * col[q] + 1];
+        im -= lu[2 * q] * s[2 * col[q] + 1] + lu[2 * q + 1] * s[2 * col[q]];
+    }
+    s[2 * i] = re * inverse[2 * i] - im * inverse[2 * i + 1];
+    s[2 * i + 1] = re * inverse[2 * i + 1] + im * inverse[2 * i];
+}
+
+static void sweep_down(double *w) {
+    for (int i = 0; i < NB; ++i) sweep_row(w + FACTORS, w + CURRENT, w + SWEPT, OF(w), i);
+}
+
+static void solve_up(double *w) {
+    for (int i = NB - 1; i >= 0; --i) solve_row(w + FACTORS, w + INVERSE, w + SWEPT, w + SOUGHT, OF(w), i);
+}
+
 /* The solution, in the order of elimination, from b by bus: real parts, then imaginary parts. */
 static void through_factors(double *w) {
-    const double *lu = w + FACTORS, *inverse = w + INVERSE, *b = w + CURRENT;
-    double *s = w + SOUGHT;
-    const int32_t *perm = PERM, *row = ROW, *col = COL, *diag = DIAG;
-    const int n = NB;
-    for (int i = 0; i < n; ++i) {
-        double re = b[perm[i]], im = b[n + perm[i]];
-        for (int q = row[i]; q < diag[i]; ++q) {
-            re -= lu[2 * q] * s[2 * col[q]] - lu[2 * q + 1] * s[2 * col[q] + 1];
-            im -= lu[2 * q] * s[2 * col[q] + 1] + lu[2 * q + 1] * s[2 * col[q]];
-        }
-        s[2 * i] = re;
-        s[2 * i + 1] = im;
-    }
-    for (int i = n - 1; i >= 0; --i) {
-        double re = s[2 * i], im = s[2 * i + 1];
-        for (int q = diag[i] + 1; q < row[i + 1]; ++q) {
-            re -= lu[2 * q] * s[2 * col[q]] - lu[2 * q + 1] * s[2 * col[q] + 1];
-            im -= lu[2 * q] * s[2 * col[q] + 1] + lu[2 * q + 1] * s[2 * col[q]];
-        }
-        s[2 * i] = re * inverse[2 * i] - im * inverse[2 * i + 1];
-        s[2 * i + 1] = re * inverse[2 * i + 1] + im * inverse[2 * i];
-    }
+    sweep_down(w);
+    solve_up(w);
+    OF(w)->swept = NOTHING; /* b may be anybody's */
 }
 
 /* Whether a trial solution leaves hardly anything over. A network that is not passive may need pivoting. The currents
@@ -107,16 +123,45 @@ static void factorise_nodes(double *w) {
     w[MADE_OF] = OF(w)->made_of_parameters = 1;
 }
 
-/* Voltages in their slots, by bus: real parts, then imaginary parts. */
-static void solve_nodes(double *w) {
+/* Currents, and rows down, as the slots have them: all, or those alone that the states have moved since. */
+static void sweep(double *w) {
+    const struct reach *r = &OF(w)->reach;
+    double *b = w + CURRENT;
+    if (OF(w)->swept == NOTHING) {
+        if (!unchanged(w)) factorise_nodes(w);
+        evaluate(w, CURRENTS, b);
+        sweep_down(w);
+    } else if (OF(w)->swept == BUT_STATES) {
+        execute_moved(w);
+        for (int k = 0; k < r->currents; ++k) take(w, CURRENTS, r->current[k], 1, b + r->current[k]);
+        for (int k = 0; k < r->n_down; ++k) sweep_row(w + FACTORS, b, w + SWEPT, OF(w), r->down[k]);
+    }
+    OF(w)->swept = ALL;
+}
+
+static void place_voltage(double *w, int i) {
     double *v = SLOT + AT_V;
     const double *s = w + SOUGHT;
-    if (!unchanged(w)) factorise_nodes(w);
-    evaluate(w, CURRENTS, w + CURRENT);
-    through_factors(w);
-    for (int i = 0; i < NB; ++i) {
-        v[PERM[i]] = s[2 * i];
-        v[NB + PERM[i]] = s[2 * i + 1];
+    v[PERM[i]] = s[2 * i];
+    v[NB + PERM[i]] = s[2 * i + 1];
+}
+
+/* Voltages in their slots, by bus: real parts, then imaginary parts. ALL, or those WANTED by rates. */
+static void solve_nodes(double *w, int which) {
+    const struct reach *r = &OF(w)->reach;
+    sweep(w);
+    if (which == ALL) {
+        solve_up(w);
+        for (int i = 0; i < NB; ++i) place_voltage(w, i);
+    } else {
+        for (int k = 0; k < r->n_up; ++k) {
+            solve_row(w + FACTORS, w + INVERSE, w + SWEPT, w + SOUGHT, OF(w), r->up[k]);
+            place_voltage(w, r->up[k]);
+        }
     }
-    OF(w)->settled = 1;
+    OF(w)->settled = which;
+}
+
+static void settle_voltages(double *w, int which) {
+    if (OF(w)->settled < which) solve_nodes(w, which);
 }

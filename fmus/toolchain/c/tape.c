@@ -23,57 +23,73 @@
                      d = slot[at[takes > 3 ? 3 : 0]];                                                                  \
         (void)b, (void)c, (void)d;                                                                                     \
         at += takes;                                                                                                   \
-        *out++ = value;                                                                                                \
+        KEEP(value);                                                                                                   \
     }
 enum { CODES = 34, LARGEST = 1 << 27 };
 /* By code. Two operations of one code have two roundings, as they had apart: there is no contraction. */
 static const char TAKES[CODES] = {2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 1,
                                   1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 3, 3, 3, 4, 4};
 
+#define OPERATIONS                                                                                                     \
+    RUN(0, 2, a + b)                                                                                                   \
+    RUN(1, 2, a - b)                                                                                                   \
+    RUN(2, 2, a * b)                                                                                                   \
+    RUN(3, 2, a / b)                                                                                                   \
+    RUN(4, 2, pow(a, b))                                                                                               \
+    RUN(5, 2, atan2(a, b))                                                                                             \
+    RUN(6, 2, copysign(a, b))                                                                                          \
+    RUN(7, 2, fmin(a, b))                                                                                              \
+    RUN(8, 2, fmax(a, b))                                                                                              \
+    RUN(9, 2, a < b)                                                                                                   \
+    RUN(10, 2, a <= b)                                                                                                 \
+    RUN(11, 2, a == b)                                                                                                 \
+    RUN(12, 2, a != b)                                                                                                 \
+    RUN(13, 2, a && b)                                                                                                 \
+    RUN(14, 2, a || b)                                                                                                 \
+    RUN(15, 2, a ? b : 0)                                                                                              \
+    RUN(16, 1, -a)                                                                                                     \
+    RUN(17, 1, 1. / a)                                                                                                 \
+    RUN(18, 1, a * a)                                                                                                  \
+    RUN(19, 1, 2. * a)                                                                                                 \
+    RUN(20, 1, sqrt(a))                                                                                                \
+    RUN(21, 1, sin(a))                                                                                                 \
+    RUN(22, 1, cos(a))                                                                                                 \
+    RUN(23, 1, tan(a))                                                                                                 \
+    RUN(24, 1, exp(a))                                                                                                 \
+    RUN(25, 1, log(a))                                                                                                 \
+    RUN(26, 1, fabs(a))                                                                                                \
+    RUN(27, 1, floor(a))                                                                                               \
+    RUN(28, 1, !a)                                                                                                     \
+    RUN(29, 3, a * b + c)                                                                                              \
+    RUN(30, 3, a * b - c)                                                                                              \
+    RUN(31, 3, c - a * b)                                                                                              \
+    RUN(32, 4, a * b + c * d)                                                                                          \
+    RUN(33, 4, a * b - c * d)
+
 /* Execute a section on the slots; what it computes lies from `out` on. A value may be used in its own run. */
 static void execute(double *w, int which, double *out) {
     const uint32_t *run = OF(w)->run[which], *end = run + 2 * OF(w)->size.section[which].runs;
     const uint32_t *at = OF(w)->operand[which];
     const double *slot = SLOT;
+#define KEEP(value) *out++ = value
     for (; run < end; run += 2) {
         int n = (int)run[1];
-        switch (run[0]) {
-            RUN(0, 2, a + b)
-            RUN(1, 2, a - b)
-            RUN(2, 2, a * b)
-            RUN(3, 2, a / b)
-            RUN(4, 2, pow(a, b))
-            RUN(5, 2, atan2(a, b))
-            RUN(6, 2, copysign(a, b))
-            RUN(7, 2, fmin(a, b))
-            RUN(8, 2, fmax(a, b))
-            RUN(9, 2, a < b)
-            RUN(10, 2, a <= b)
-            RUN(11, 2, a == b)
-            RUN(12, 2, a != b)
-            RUN(13, 2, a && b)
-            RUN(14, 2, a || b)
-            RUN(15, 2, a ? b : 0)
-            RUN(16, 1, -a)
-            RUN(17, 1, 1. / a)
-            RUN(18, 1, a * a)
-            RUN(19, 1, 2. * a)
-            RUN(20, 1, sqrt(a))
-            RUN(21, 1, sin(a))
-            RUN(22, 1, cos(a))
-            RUN(23, 1, tan(a))
-            RUN(24, 1, exp(a))
-            RUN(25, 1, log(a))
-            RUN(26, 1, fabs(a))
-            RUN(27, 1, floor(a))
-            RUN(28, 1, !a)
-            RUN(29, 3, a * b + c)
-            RUN(30, 3, a * b - c)
-            RUN(31, 3, c - a * b)
-            RUN(32, 4, a * b + c * d)
-            RUN(33, 4, a * b - c * d)
-        }
+        switch (run[0]) { OPERATIONS }
     }
+#undef KEEP
+}
+
+/* Execute what the currents that a state moves need. */
+static void execute_moved(double *w) {
+    const int32_t *run = OF(w)->reach.run, *end = run + 2 * OF(w)->reach.runs, *place = OF(w)->reach.place;
+    const uint32_t *at = OF(w)->reach.operand;
+    double *slot = SLOT;
+#define KEEP(value) slot[*place++] = value
+    for (; run < end; run += 2) {
+        int n = run[1];
+        switch (run[0]) { OPERATIONS }
+    }
+#undef KEEP
 }
 
 /* The first n results of a section from number `first` on, which was executed. */
@@ -92,7 +108,9 @@ static void evaluate(double *w, int which, double *value) {
 static void fill(double *w, int first, const double *value, int n) {
     if (!memcmp(SLOT + first, value, n * sizeof *value)) return;
     memcpy(SLOT + first, value, n * sizeof *value);
-    OF(w)->settled = 0;
+    OF(w)->settled = NOTHING;
+    if (first != X) OF(w)->swept = NOTHING;
+    if (OF(w)->swept == ALL) OF(w)->swept = BUT_STATES;
 }
 
 /* Parameters, what they fix, and inputs in their slots. */
@@ -101,11 +119,13 @@ static void enter(const double *z, double *w) {
         memcpy(SLOT, z, U * sizeof *z);
         execute(w, FIXED, SLOT + AT_FIXED);
         OF(w)->known = 1;
-        OF(w)->settled = OF(w)->made_of_parameters = 0;
+        OF(w)->swept = OF(w)->settled = NOTHING;
+        OF(w)->made_of_parameters = 0;
     }
     fill(w, U, z + U, NU);
 }
 
+#include "reach.c"
 #include "nodal.c"
 
 /* A function of states, at the voltages that these give. Outputs and rates are often asked for at one point, and outputs
@@ -113,7 +133,7 @@ static void enter(const double *z, double *w) {
 static void at_states(double *w, int which, const double *x, double *value) {
     if (!OF(w)->size.section[which].results) return; /* most phasor networks have no states */
     fill(w, X, x, NX);
-    if (NB && !OF(w)->settled) solve_nodes(w);
+    if (NB) settle_voltages(w, which == DERIVATIVES ? WANTED : ALL);
     evaluate(w, which, value);
 }
 
@@ -255,6 +275,7 @@ TAPE int64_t workspace_size(const void *tape) {
 TAPE void begin(const void *tape, double *w) {
     memset(w, 0, (size_t)workspace_size(tape) * sizeof *w);
     lay_out(tape, OF(w));
+    if (NB) place_reach(w, (int32_t *)(w + REACH)), find_reach(w);
     memcpy(SLOT + AT_GH + 1, (const struct header *)tape + 1, OF(w)->size.numbers * sizeof *w);
 }
 
@@ -289,7 +310,7 @@ TAPE int glance(double *z, double *w, const unsigned *reference, size_t n, doubl
     }
     enter(z, w);
     fill(w, X, z + X, NX);
-    if (!OF(w)->settled) solve_nodes(w);
+    settle_voltages(w, ALL);
     if (rates_wanted) evaluate(w, DERIVATIVES, z + DX);
     for (size_t k = 0; k < n; ++k) {
         const int is_output = reference[k] >= first && reference[k] < end;

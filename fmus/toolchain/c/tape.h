@@ -33,15 +33,26 @@ struct header {
     struct sizes size;
 };
 
+/* How much of a network's solution is that of the slots. */
+enum { NOTHING, BUT_STATES, WANTED, ALL }; /* all but what states reach; the voltages that rates want */
+
+struct reach { /* as `reach.c` finds it */
+    int32_t *down, *up, *current, *run, *place;
+    uint32_t *operand;
+    int32_t n_down, n_up, currents, runs;
+};
+
 /* The beginning of every workspace. Behind it lie the slots (p, c, u, x, v, gh, numbers, what is fixed by p and c, what
    a section computes), then what an integrator or a network keeps. */
 struct tape {
     struct sizes size;
     double largest_rest; /* part of its terms that a row of Y v = i may leave over; with more, no voltage is finite */
     int known; /* whether the slots of p and c, and those that they fix, are filled */
-    int settled; /* whether the slots of v hold the voltages at what the slots of p, c, u and x hold */
+    int swept;   /* NOTHING, BUT_STATES or ALL: which currents and rows down are of what the slots of p, c, u and x hold */
+    int settled; /* NOTHING, WANTED or ALL: which slots of v hold the voltages there */
     int made_of_parameters; /* whether a network's factors are known to be of what the slots of p and c hold */
     const int32_t *stepwise, *given_at, *perm, *row, *col, *diag, *mrow, *mcol;
+    struct reach reach;
     const uint32_t *run[SECTIONS], *result[SECTIONS], *operand[SECTIONS]; /* run: code and length of each */
 };
 
