@@ -258,7 +258,30 @@ class SequenceReading:
                 self._scaled(found.impedance(key, 0) * key.square),
                 tuple(self._scaled(found.earthing(key, p, k)) for k, p in enumerate(places)),
             )
+            self._compare_transformer(record, name)
         return ""
+
+    def _compare_transformer(self, record: Record, name: str) -> None:
+        """Ask about signs of a transformer of two windings that differ from those of Z1, or of its earthing.
+
+        A leg of a star may be below 0, so those of three windings are not asked about."""
+        known, found = self.elements.lines.get(name), self.branches[name]
+        if known is None:
+            return
+        turned = [
+            f"{symbol}0 = {zero:.4g} pu, where {symbol}1 is {own:.4g}"
+            for symbol, zero, own in (("X", found.z.imag, known.X), ("R", found.z.real, known.R))
+            if zero * own < 0
+        ]
+        turned += [
+            f"{symbol}G = {part:.4g} pu"
+            for z in found.earthing
+            for symbol, part in (("R", z.real), ("X", z.imag))
+            if part < 0
+        ]
+        if turned:
+            text = f"{name} has {', and '.join(turned)} (on 100 MVA): used as it stands; is its sign wrong?"
+            self._ask(record, text, "the sign of a transformer's Z0")
 
     def _scaled(self, z: complex) -> complex:
         return z * self._on_100

@@ -272,6 +272,29 @@ def test_one_lines_unusual_impedance_is_asked_about_at_its_record(change, words,
     assert not told(usual, "sign wrong")
 
 
+def signed(field, sign=-1):
+    """The file with the sign of one value of machine 3's transformer turned, and that record's line."""
+    lines = seq().splitlines()
+    at = next(k for k, line in enumerate(lines) if ",3,0,'1 ',1,1,12," in line)
+    values = lines[at].split(",")
+    values[field] = str(sign * float(values[field]))
+    lines[at] = ",".join(values)
+    return "\n".join([*lines, ""]), at + 1
+
+
+X_G, X_01 = 8, 10
+"""Columns of a two-winding transformer's record."""
+
+
+@pytest.mark.parametrize(("field", "said"), [(X_01, "X0 = -"), (X_G, "XG = -")])
+def test_a_turned_sign_of_a_transformers_zero_sequence_is_asked_about(field, said, prepared):
+    text, line = signed(field)
+    (asked,) = told(prepared(text), "(on 100 MVA): used as it stands; is its sign wrong?")
+    assert f"line {line}:" in asked
+    assert said in asked
+    assert not told(prepared(signed(field, 1)[0]), "sign wrong?")
+
+
 @pytest.mark.parametrize("count", [1, 3])
 def test_each_negative_impedance_of_a_machine_is_asked_about_by_name(count, prepared):
     """However many of the machines have one: no median hides it, and no base is asked about."""
