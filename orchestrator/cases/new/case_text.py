@@ -25,7 +25,10 @@ _STEPS = {"emt": "100 us", "phasor": "2 ms"}
 
 _MOST_CURVES = 12
 _MOST_MOVES = 5  # of taps and shunts that are named; the others are counted
-_EMF = """emf w·e''; [conventions] like = "psse" takes PSS/E's e'', which moves dampings by tenths of a point"""
+_EMF = (
+    """emf w·e''; [conventions] like = "psse" takes PSS/E's e'', which moves dampings by tenths of a point, of """
+    "classical machines by up to about one"
+)
 
 
 def bus_of_largest_load(loads: Sequence[Load], buses: Sequence[str]) -> str:
