@@ -11,7 +11,7 @@ from typing import Any
 from orchestrator.core.errors import few
 from orchestrator.core.options import Option
 from orchestrator.core.truth import all_true
-from orchestrator.linear.spectra.modes import Mode, damping_percent
+from orchestrator.linear.spectra.modes import Mode, damping_percent, damping_ratio
 from orchestrator.output.report.column_table import ShownTable
 from orchestrator.output.report.html.elements import SHADES, Figures, damping, document, table
 from orchestrator.output.report.html.network_map import network_map
@@ -23,7 +23,7 @@ from orchestrator.studies.siting.confirmation import Confirmation
 from orchestrator.studies.siting.place_ranking import PlaceRanking
 from orchestrator.studies.siting.placing import ACTIVE, OURS_MVA, REACTIVE
 from orchestrator.studies.siting.residues import SeenMode, Situation
-from orchestrator.studies.siting.study import DEVICE, DROOP, SiteResult, SupportShift
+from orchestrator.studies.siting.study import DEVICE, DROOP, HARDLY, SiteResult, SupportShift
 
 TITLES = {"pod_p": "POD-P", "pod_q": "POD-Q", DROOP: "a droop"}
 # damping [points] by 1 MW/Hz below which no bus reaches a mode: 1000 give a hundredth of a point
@@ -40,6 +40,10 @@ _MVAR = "per_100_Mvar_per_Hz"
 
 _SHOWN = 12  # buses in a table, best first
 _NAMED = 4  # things in a sentence; the others are counted
+_COLUMNS = (
+    6  # modes in the terminal's table, the least damped; more columns leave no room for figures
+)
+_OUTSIDE = ", outside of --range"
 
 
 class Siting(PlaceRanking[SiteResult]):
@@ -127,8 +131,14 @@ def answer_in_parts(result: SiteResult) -> tuple[str, str]:
     if max(result.least(bus)[0] for bus in result.ranking) < (
         0 if result.request.is_foreign else _NONE
     ):
+        none = (
+            f"none of the {len(result.ranking)} buses asked for is a"
+            if result.request.buses
+            else "no bus is a"
+        )
+        place = f"{best[0]} is no" if len(result.ranking) == 1 else none
         return (
-            f"no bus is a place for {device_title(result)}: it does not help the mode {_called(mode)}{after}",
+            f"{place} place for {device_title(result)}: it does not help the mode {_called(mode)}{after}",
             "",
         )
     among = " of those asked for" if result.request.buses else ""
@@ -281,7 +291,7 @@ def _rated(result: SiteResult) -> str:
 
 def remarks(result: SiteResult) -> list[str]:
     """Modes that the best bus, or no bus, reaches; what was not judged."""
-    said, best = [], result.ranking[0]
+    said, out_of_reach, best = [], list[tuple[str, str]](), result.ranking[0]
     for seen in result.intact.modes:
         shifts = result.shifts[DEVICE][result.intact.name][seen.label]
         top = max(shifts, key=lambda bus: abs(shifts[bus].change))
@@ -295,22 +305,52 @@ def remarks(result: SiteResult) -> list[str]:
             )
         elif shifts[best].hardly:
             part = f"{100 * shifts[best].part:.1g} % of {strongest}"
-            said.append(f"{_called(seen)}: not controllable at {best} ({part})")
-    said += [f"not judged: {open_point}" for open_point in open_points(result)]
+            out_of_reach.append((_called(seen), part))
+    said += _not_controllable(out_of_reach, best)
+    said += _not_judged(result)
     if result.terminals:
         there = few(result.terminals, _NAMED)
         said.append(f"left out: the terminals of units, {there}; --buses 'bus_*' takes all buses")
     return said
 
 
+def _not_controllable(modes: Sequence[tuple[str, str]], bus: str) -> list[str]:
+    """Say which modes, each with its part of the best, a bus hardly moves: one by one, or many in one sentence."""
+    if len(modes) <= _NAMED:
+        return [f"{mode}: not controllable at {bus} ({part})" for mode, part in modes]
+    named = few([mode for mode, _ in modes], _NAMED, "; ")
+    return [
+        f"{len(modes)} modes are not controllable at {bus} (each at most {100 * HARDLY:g} % of the strongest place): "
+        f"{named}"
+    ]
+
+
+def _not_judged(result: SiteResult) -> list[str]:
+    """Say what the study did not judge: one by one, or many swings outside of its range in one sentence."""
+    beyond, outages = _swings_beyond(result), _outages_without(result)
+    if len(beyond) <= _NAMED:
+        return [f"not judged: {point}" for point in (*beyond, *outages)]
+    swings = few([text.removesuffix(_OUTSIDE) for text in beyond], _NAMED, "; ")
+    many = f"not judged: {len(beyond)} swings{_OUTSIDE}, least damped first: {swings}"
+    return [many, *(f"not judged: {point}" for point in outages)]
+
+
 def open_points(result: SiteResult) -> list[str]:
     """Modes and outages that the study did not judge, each with the reason."""
+    return [*_swings_beyond(result), *_outages_without(result)]
+
+
+def _swings_beyond(result: SiteResult) -> list[str]:
     hidden = result.intact.found.hidden
-    beyond = [
-        f"{value.imag / math.tau:.3f} Hz, {damping_percent(value):.2f} %, outside of --range"
-        for value in (hidden.electromechanical if hidden else ())
+    values = sorted(hidden.electromechanical, key=damping_ratio) if hidden else []
+    return [
+        f"{value.imag / math.tau:.3f} Hz, {damping_percent(value):.2f} %{_OUTSIDE}"
+        for value in values
     ]
-    return [*beyond, *(f"outage {name}: {why}" for name, why in result.not_judged.items())]
+
+
+def _outages_without(result: SiteResult) -> list[str]:
+    return [f"outage {name}: {why}" for name, why in result.not_judged.items()]
 
 
 def _unit_in_keys(result: SiteResult) -> str:
@@ -454,13 +494,20 @@ def rows(result: SiteResult) -> list[dict[str, Any]]:
 
 
 def ranking_table(result: SiteResult) -> ShownTable:
-    """The best buses."""
-    return _table_of(result, f"{unit(result, '100')}; best first", result.ranking[:_SHOWN])
+    """The best buses, and what they do to the least damped modes."""
+    title, number = f"{unit(result, '100')}; best first", len(result.intact.modes)
+    if number > _COLUMNS:
+        title += f"; the {_COLUMNS} least damped of {number} modes, --json has all"
+    return _table_of(result, title, result.ranking[:_SHOWN], _COLUMNS)
 
 
-def _table_of(result: SiteResult, title: str, buses: Sequence[str]) -> ShownTable:
-    modes = [f"{seen.label}, {seen.mode.damping_percent:.2f} %" for seen in result.intact.modes]
-    rows = [[bus, *_cells(result, bus), *_confirmed_cells(result, bus)] for bus in buses]
+def _table_of(
+    result: SiteResult, title: str, buses: Sequence[str], most: int | None = None
+) -> ShownTable:
+    """Return the shifts of the modes, of at most so many where a number is given, by bus."""
+    seen_modes = result.intact.modes[:most]
+    modes = [f"{seen.label}, {seen.mode.damping_percent:.2f} %" for seen in seen_modes]
+    rows = [[bus, *_cells(result, bus)[:most], *_confirmed_cells(result, bus)] for bus in buses]
     return ShownTable(title, ["Bus", *modes, *_confirmed_headings(result)], rows)
 
 

@@ -1,5 +1,8 @@
 """Places in networks: every bus of ieee39 against the coupled FMUs, an exhaustive search, outages, a vendor's FMU."""
 
+import re
+from dataclasses import replace
+
 import pytest
 
 from orchestrator.cases.case import load_case
@@ -9,8 +12,8 @@ from orchestrator.linear.spectra.continuation import Eigenpair, pairs_near
 from orchestrator.studies.modes.modes import running
 from orchestrator.studies.siting.confirmation import same_mode
 from orchestrator.studies.siting.placing import converter, name_at, response_of, with_devices
-from orchestrator.studies.siting.study import SiteRequest, find_sites
-from orchestrator.studies.siting.view import remarks
+from orchestrator.studies.siting.study import DEVICE, SiteRequest, find_sites
+from orchestrator.studies.siting.view import answer, open_points, ranking_table, remarks
 
 pytestmark = pytest.mark.slow
 
@@ -61,6 +64,37 @@ def test_an_exhaustive_search_finds_the_same_best_place():
     ranked = [damping[bus] for bus in by_support]
     assert ranked[0] == max(ranked)
     assert ranked[0] > ranked[3] > ranked[8]
+
+
+def test_many_modes_are_counted_and_a_terminal_shows_the_least_damped_of_them():
+    found = find_sites(
+        load_case("ieee39"),
+        SiteRequest(
+            "droop", scenario="base", confirm=0, below=0.5, buses=("bus_1",), frequencies=(1.17, 2)
+        ),
+    )
+    modes = found.intact.modes
+    assert len(modes) > 6
+    assert len(ranking_table(found).headings) == 1 + 6
+    (counted,) = (text for text in remarks(found) if "not controllable" in text)
+    assert counted.startswith("6 modes are not controllable at bus_1")
+    assert f"{modes[0].mode.frequency_hz:.3f} Hz" in counted
+    beyond = open_points(found)
+    assert len(beyond) >= 2
+    least = [float(re.search(r"Hz, (.*) %", text)[1]) for text in beyond]
+    assert least == sorted(least)
+    unmoved = replace(found, shifts={**found.shifts, DEVICE: _unmoved(found)})
+    assert answer(unmoved).startswith("bus_1 is no place for a droop: it does not help the mode")
+
+
+def _unmoved(found):
+    return {
+        at: {
+            mode: {bus: replace(shift, damping=0.0) for bus, shift in by_bus.items()}
+            for mode, by_bus in by_mode.items()
+        }
+        for at, by_mode in found.shifts[DEVICE].items()
+    }
 
 
 def test_outages_are_ranked_and_what_a_bus_does_not_reach_is_said():
