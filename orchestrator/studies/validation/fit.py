@@ -132,17 +132,44 @@ class _Best:
     values: dict[str, float | bool] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class _Trial:
-    """A fit with the switches in one position."""
+@dataclass
+class _Search:
+    """A fit with the switches in one position, from one start after the other."""
 
     switches: Mapping[str, bool]
     told: Sequence[Adjustable]
     untold: Mapping[str, tuple[Untold, tuple[str, ...]]]
+    starts: Iterator[list[Adjustable]]
+    best: _Best = field(default_factory=_Best)
+
+    @property
+    def reached(self) -> bool:
+        return self.best.rms <= _REACHED
+
+    def fit_once(self, residuals: Residuals) -> None:
+        """Fit from the next start, if there is one: where no parameter can be told, there is nothing to fit."""
+        begin = next(self.starts, None)
+        if begin is not None:
+            _least_squares(residuals, begin, self.switches, self.best)
+
+    def fit_until_reached(self, residuals: Residuals) -> None:
+        """Fit from the starts that are left, until the device comes near to the recordings."""
+        for begin in self.starts:
+            _least_squares(residuals, begin, self.switches, self.best)
+            if self.reached:
+                return
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """The best fit, with the errors that it leaves; ``slopes``: None if it was interrupted or had nothing to fit."""
+
+    told: Sequence[Adjustable]
+    untold: Mapping[str, tuple[Untold, tuple[str, ...]]]
+    switches: Mapping[str, bool]
     values: Mapping[str, float | bool]
     errors: Numbers
     slopes: Matrix | None
-    finished: bool = True
 
     @property
     def cost(self) -> float:
@@ -162,20 +189,25 @@ def fit_parameters(
     residuals = Residuals(device, stretches, report)
     starts = {name: bool(device.value(name)) for name in wanted.switches}
     before = residuals.at({})
-    trials = []
-    for position in itertools.product((False, True), repeat=len(wanted.switches)):
-        switches = dict(zip(wanted.switches, position, strict=True))
-        trials.append(_trial(residuals, wanted.numbers, switches))
-        if not trials[-1].finished:
-            break
-    best = min(trials, key=lambda one: one.cost)
+    searches: list[_Search] = []
+    slopes: Matrix | None = None
+    finished = False
+    try:
+        _search(residuals, wanted, searches)
+        slopes = _slopes_of_all(residuals, _best_of(searches))
+        finished = True
+    except KeyboardInterrupt:
+        if not any(one.best.values for one in searches):
+            raise
+    found = _best_of(searches)
+    values = found.best.values
+    errors = residuals.at(values)
+    best = _Trial(found.told, found.untold, found.switches, values, errors, slopes)
     numbers = _numbers(best, wanted, residuals)
-    finished = all(one.finished for one in trials)
     if finished and _rms(best.errors) > max(_REACHED, _LEAVES * _rms(before)):
         numbers = [_left_at_start(one) for one in numbers]
-    found = [*_switches(best, trials, starts, residuals), *numbers]
     return Fit(
-        parameters=found,
+        parameters=[*_switches(best, searches, starts, residuals), *numbers],
         fitted_to=[one.recording.label for one in events],
         error_before=_rms(before),
         error_after=_rms(best.errors),
@@ -184,32 +216,45 @@ def fit_parameters(
     )
 
 
+def _search(residuals: Residuals, wanted: Wanted, searches: list[_Search]) -> None:
+    """Fit once in every position of the switches; from further starts only where none of these fits will do."""
+    for position in itertools.product((False, True), repeat=len(wanted.switches)):
+        switches = dict(zip(wanted.switches, position, strict=True))
+        searches.append(_begun(residuals, wanted.numbers, switches))
+        searches[-1].fit_once(residuals)
+    for one in sorted(searches, key=lambda one: one.best.cost):
+        if any(other.reached for other in searches):
+            return
+        one.fit_until_reached(residuals)
+
+
+def _begun(
+    residuals: Residuals, numbers: Sequence[Adjustable], switches: Mapping[str, bool]
+) -> _Search:
+    told, untold = identifiable(residuals, numbers, switches)
+    if told:
+        return _Search(switches, told, untold, _starts(residuals, told, switches))
+    errors = residuals.at(switches)
+    best = _Best(float(errors @ errors), _rms(errors), dict(switches))
+    return _Search(switches, told, untold, iter(()), best)
+
+
+def _best_of(searches: Sequence[_Search]) -> _Search:
+    """The search that leaves the least; one that was interrupted before it had values is none."""
+    return min((one for one in searches if one.best.values), key=lambda one: one.best.cost)
+
+
+def _slopes_of_all(residuals: Residuals, found: _Search) -> Matrix | None:
+    """How the errors move with each parameter and each hidden voltage, at the best values."""
+    if not found.told:
+        return None
+    values = found.best.values
+    own = _slopes_inside(residuals, found.told, values)
+    return np.column_stack([own, residuals.hidden_slopes(values)])
+
+
 def _rms(errors: Numbers) -> float:
     return float(np.sqrt(np.mean(errors**2)))
-
-
-def _trial(
-    residuals: Residuals, numbers: Sequence[Adjustable], switches: Mapping[str, bool]
-) -> _Trial:
-    told, untold = identifiable(residuals, numbers, switches)
-    if not told:
-        return _Trial(switches, [], untold, dict(switches), residuals.at(switches), None)
-    best = _Best()
-    finished = True
-    slopes = None
-    try:
-        for begin in _starts(residuals, told, switches):
-            _least_squares(residuals, begin, switches, best)
-            if best.rms <= _REACHED:
-                break
-        own = _slopes_inside(residuals, told, best.values)
-        slopes = np.column_stack([own, residuals.hidden_slopes(best.values)])
-    except KeyboardInterrupt:
-        finished = False
-        if not best.values:
-            raise
-    errors = residuals.at(best.values)
-    return _Trial(switches, told, untold, best.values, errors, slopes=slopes, finished=finished)
 
 
 def _starts(
@@ -455,16 +500,16 @@ def _half_widths(best: _Trial, residuals: Residuals) -> dict[str, float]:
 
 
 def _switches(
-    best: _Trial, trials: Sequence[_Trial], starts: Mapping[str, bool], residuals: Residuals
+    best: _Trial, searches: Sequence[_Search], starts: Mapping[str, bool], residuals: Residuals
 ) -> list[FittedParameter]:
-    """Each switch: its position, told where every trial with the other one is clearly worse."""
+    """Each switch: its position, told where every fit with the other one is clearly worse."""
     count = len(best.errors)
     variance = max(best.cost / count, 1.0)
     alike = count / max(independent_samples(best.errors, residuals.stretches), 1.0)
     found = []
     for name, start in starts.items():
         value = best.switches[name]
-        others = [one.cost for one in trials if one.switches[name] != value]
+        others = [one.best.cost for one in searches if one.switches[name] != value]
         worse = (min(others) - best.cost) / (variance * alike) if others else 0.0
         untold = None if worse > _SWITCH_TELLS else Untold.NO_EFFECT
         kept = value if untold is None else start
