@@ -20,6 +20,7 @@ from orchestrator.studies.black_box.bench import drive
 from orchestrator.studies.validation.averaging import averaged
 from orchestrator.studies.validation.held_in_step import hold_in_step
 from orchestrator.studies.validation.instances import InstanceRun, InstanceShelf
+from orchestrator.studies.validation.over_limit import OverLimit, limit_outputs, over_limit
 from orchestrator.studies.validation.record import Recording
 from orchestrator.studies.validation.trials import TrialLog
 from orchestrator.systems.coupling.step_awareness import STEP_PARAMETER
@@ -68,6 +69,7 @@ class Played:
     settled_after: float
     rest: complex
     still: bool  # whether it came to rest
+    over_limit: OverLimit | None = None  # where its current is above a limit that it lacks
 
     def same_as(self, other: Played) -> bool:
         """Return whether both are the same to the last bit."""
@@ -176,10 +178,11 @@ class PlayedDevice:
         at = (start.voltage.real, start.voltage.imag)
         begin = RealBatch(component, _CURRENT).read().copy()
         before = self._rest(component, at, begin)
-        driven = self._driven(component, recording, before)
+        driven, over = self._driven(component, recording, before)
         rest = start.voltage * complex(*before[-1]).conjugate() * SYSTEM_BASE_MVA / self.rating
         settled_after = (len(before) - 1) * self.step_size
-        return Played(driven, settled_after, rest, still=settled_after < _LONGEST_REST)
+        still = settled_after < _LONGEST_REST
+        return Played(driven, settled_after, rest, still, over)
 
     def _told_step(self) -> dict[str, float]:
         """The communication step, for a device whose outputs are for the middle of the next one.
@@ -226,8 +229,12 @@ class PlayedDevice:
                 break
         return np.concatenate(rows)
 
-    def _driven(self, component: Component, recording: Recording, before: Numbers) -> Complex:
-        """Power at the recording's times [pu of the rating], as means over as long as the recording's."""
+    def _driven(
+        self, component: Component, recording: Recording, before: Numbers
+    ) -> tuple[Complex, OverLimit | None]:
+        """Power at the recording's times [pu of the rating], as means over as long as the recording's.
+
+        And where the current is above a limit that the device lacks, unless the voltage turns with it."""
         steps = int(np.ceil(recording.length / self.step_size - 1e-9))
         times: Numbers = np.asarray(self.step_size * np.arange(steps + 1))
         voltage = recording.at(times)
@@ -235,14 +242,18 @@ class PlayedDevice:
         index = len(before) - 1
         scale = SYSTEM_BASE_MVA / self.rating
         turn: Numbers = np.zeros(steps + 1)
+        over = None
         if self.gives_way:
             currents, turn[1:] = self._held_in_step(component, recording, held, index)
         else:
             late = held[:, -1] if held.shape[1] > 1 else None
-            currents = self._currents(component, held.mean(axis=1), late, index)
+            outputs = self._outputs(component, held.mean(axis=1), late, index)
+            currents = outputs[:, :2] @ _IN_PHASOR
+            over = over_limit(outputs[:, 2], self.step_size) if outputs.shape[1] > 2 else None
         currents = np.concatenate([before[-1:] @ _IN_PHASOR, currents])
         power = voltage * currents.conj() * scale + turn
-        return averaged(times, power, recording.average, recording.times, recording.ahead)
+        means = averaged(times, power, recording.average, recording.times, recording.ahead)
+        return means, over
 
     def _held_in_step(
         self, component: Component, recording: Recording, held: Complex, index: int
@@ -253,9 +264,9 @@ class PlayedDevice:
 
         def stretch(voltage: Complex, late: Complex) -> Complex:
             nonlocal made
-            found = self._currents(component, voltage, late, made)
+            found = self._outputs(component, voltage, late, made)
             made += len(voltage)
-            return found * scale
+            return np.asarray(found[:, :2] @ _IN_PHASOR * scale)
 
         good = recording.good
         current: Complex = np.conj(recording.power[good] / recording.voltage[good])
@@ -264,13 +275,13 @@ class PlayedDevice:
         run = hold_in_step(stretch, (held.mean(axis=1), held[:, -1]), measured, self.step_size)
         return run.current / scale, run.turn
 
-    def _currents(
+    def _outputs(
         self, component: Component, voltage: Complex, late: Complex | None, index: int
-    ) -> Complex:
-        """Currents after steps with so many voltages, in the device's unit."""
+    ) -> Numbers:
+        """The current after steps with so many voltages, in the device's unit, and its part of a limit it lacks."""
         read = None if late is None else _columns(late)
-        found = drive(component, _NAMES, _columns(voltage), self.step_size, index, late=read)
-        return np.asarray(found @ _IN_PHASOR)
+        names = _VOLTAGE, (*_CURRENT, *limit_outputs(self.description))
+        return drive(component, names, _columns(voltage), self.step_size, index, late=read)
 
     def _step_voltages(self, recording: Recording, steps: int) -> Complex:
         """The voltages that short steps in each step would hold, shape (steps, short steps in one)."""

@@ -349,12 +349,27 @@ def _of_response(comparison: EventComparison) -> list[Question]:
         }
         found.append(Question(QuestionKind.START, figures))
     found += _assumed_bases(comparison.device)
+    found += _over_limit(comparison)
     found += _slow_samples(comparison)
     found += _without_noise(comparison)
     of_other = _of_plant(comparison) or ask_of_other_event(event.recording, played.power)
     of_other = of_other or _of_step(comparison)
     found += of_other or ask_of_setpoint(event.recording, event.windows, played.power)
     return found
+
+
+def _over_limit(comparison: EventComparison) -> list[Question]:
+    over, recording = comparison.played.over_limit, comparison.event.recording
+    if over is None:
+        return []
+    current = np.abs(recording.power[recording.good] / recording.voltage[recording.good])
+    figures = {
+        "at": recording.begin + over.begin,
+        "length": over.length,
+        "largest": over.largest,
+        "plant": float(current.max()),
+    }
+    return [Question(QuestionKind.OVER_LIMIT, figures)]
 
 
 def _of_plant(comparison: EventComparison) -> list[Question]:

@@ -45,6 +45,7 @@ class QuestionKind(StrEnum):
     SETPOINT = "setpoint"
     OUT_OF_STEP = "out of step"
     OTHER_EVENT = "another event"
+    OVER_LIMIT = "above a limit"
     TOO_GOOD = "too good"
     NO_NOISE = "no noise"
     NOISE = "noise"
@@ -59,6 +60,7 @@ FIGURES_HOLD = {
     QuestionKind.NOISE,
     QuestionKind.NO_NOISE,
     QuestionKind.SHORT_BEFORE,
+    QuestionKind.OVER_LIMIT,
 }
 """Kinds that are borne in mind, and leave a verdict standing; every other one keeps it open."""
 

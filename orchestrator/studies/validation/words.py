@@ -143,6 +143,15 @@ def _out_of_step(x: Figures) -> str:
     )
 
 
+def _over_limit(x: Figures) -> str:
+    return (
+        f"from {x['at']:.4g} s on the model's current is above its limit for {x['length']:.3g} s in all, up to "
+        f"{x['largest']:.3g} times (current_limit), and the model does not limit it: what it does from there on is not "
+        f"the plant's, whose largest current is {x['plant']:.3g} pu. Give the EMT model as well, with "
+        + Option.BESIDE
+    )
+
+
 def _other_event(x: Figures) -> str:
     moves = f"P and Q move by {x['moves']:.3g} pu and more at {x['at']:.4g} s"
     if "voltage_at" in x:
@@ -198,6 +207,7 @@ _SENTENCES: Mapping[QuestionKind, Sentence] = {
     QuestionKind.METER_ELSEWHERE: _meter_elsewhere,
     QuestionKind.SETPOINT: _setpoint,
     QuestionKind.OUT_OF_STEP: _out_of_step,
+    QuestionKind.OVER_LIMIT: _over_limit,
     QuestionKind.OTHER_EVENT: _other_event,
     QuestionKind.TOO_GOOD: _too_good,
     QuestionKind.NOISE: _noise,
