@@ -15,7 +15,8 @@ from orchestrator.face.api.progress import shown_progress
 from orchestrator.face.api.scenario import UnusualDataWarning
 from orchestrator.face.cli.arguments import add_options
 from orchestrator.face.cli.case_arguments import add_trust_argument, values_set
-from orchestrator.face.cli.terminal import saying_warnings
+from orchestrator.face.cli.progress_lines import both, progress_lines
+from orchestrator.face.cli.terminal import make_console, saying_warnings
 from orchestrator.face.explore.opened import opened
 from orchestrator.face.explore.saved import save_page
 from orchestrator.face.explore.server import Explorer
@@ -61,9 +62,14 @@ def run(options: argparse.Namespace) -> int:
         beginning["recorded"] = {"": str(options.beside)}
     if options.save is not None:
         desk = Desk(word, options.trust_fmus)
-        with shown_progress("Points", shown=True) as report, catch_warnings():
+        with (
+            progress_lines(make_console(), "explore", "points") as lines,
+            shown_progress("Points", shown=True) as report,
+            catch_warnings(),
+        ):
             simplefilter("ignore", UnusualDataWarning)  # the page has them
-            save_page(options.save, case, desk, beginning, options.vary, report, further=further)
+            told = both(report, lines.report)
+            save_page(options.save, case, desk, beginning, options.vary, told, further=further)
         print(f"Written: {options.save}{_not_on_the_page(case, [name, *further])}")
         return 0
     if options.vary:

@@ -157,7 +157,7 @@ def round_step(size: float) -> float:
 
 def grid_of(mover: Mapping[str, Any], count: int) -> list[float]:
     """Values that a slider steps through: the value itself, some below and some above, up to a few times it and down to
-    such a part of it, within the declared bounds."""
+    such a part of it, within the declared bounds; its double and its half are among them where they lie within."""
     value, minimum, maximum = mover["value"], mover["minimum"], mover["maximum"]
     size = abs(value) or 1.0
     low, high = (value / _RATIO, value * _RATIO) if value > 0 else (value - size, value + size)
@@ -166,5 +166,9 @@ def grid_of(mover: Mapping[str, Any], count: int) -> list[float]:
     sides = [np.linspace(end, value, count // 2 + 1) for end in (low, high)]
     if low > 0:
         sides = [np.geomspace(end, value, count // 2 + 1) for end in (low, high)]
+    for inside in (side[1:-1] for side in sides):
+        for wanted in (value / 2, 2 * value):
+            if len(inside) and inside.min() <= wanted <= inside.max():
+                inside[np.abs(inside - wanted).argmin()] = wanted
     others = (float(f"{x:.4g}") for x in np.concatenate(sides) if x != value)
     return sorted({value, *others})

@@ -10,6 +10,7 @@ _COMPONENTS = 6  # of a mode's participation
 _SEEN = 0.02  # an arrow shorter than this part of the longest is not drawn
 _OF_SCENARIO = ("name", "stable", "warnings", "power_flow", "modes")
 _OF_ANSWER = ("title", "verdict", "outside", "warnings", "idle", "swings", "copied", "stamp")
+_UNDRAWN = "areas"  # of a mode: the page draws participations by component and by state
 _LISTED = 1000  # parameters up to which a page lists all of them
 
 
@@ -40,7 +41,8 @@ def _smaller_mode(mode: Mapping[str, Any]) -> dict[str, Any]:
         "components": dict(components[:_COMPONENTS]),
         "shape": [one for one in shape if one["magnitude"] > least],
     }
-    return {**mode, **rounded(drawn, _OF_SHARES)}
+    others = {key: one for key, one in mode.items() if key != _UNDRAWN}
+    return {**others, **rounded(drawn, _OF_SHARES)}
 
 
 def rounded(content: Any, digits: int = _DIGITS) -> Any:

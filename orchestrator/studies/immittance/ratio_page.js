@@ -1,7 +1,7 @@
 "use strict";
 // The loop of one short-circuit ratio, scaled to any other; verdicts are those of the ratios that were judged.
 const held = JSON.parse(document.getElementById("held").textContent), at = id => document.getElementById(id);
-const COLOURS = ["#0072b2", "#d55e00"], SIDE = 460, first = held.judged[0].ratio, last = held.judged.at(-1).ratio;
+const COLOURS = ["var(--one)", "var(--two)"], WIDEST = 460, first = held.judged[0].ratio, last = held.judged.at(-1).ratio;
 let reach = 3;
 const within = (x, low, high) => Math.min(high, Math.max(low, x));
 const figure = (x, digits = 3) => String(+x.toPrecision(digits)).replace("-", "−");
@@ -35,15 +35,16 @@ function paint() {
   at("verdict").className = { stable: "good", unstable: "bad" }[said.verdict] ?? "soft";
   at("verdict").style.fontWeight = 600;
   at("verdict").textContent = `${said.verdict === "unstable" ? "UNSTABLE" : said.verdict} at a short-circuit ratio of ${figure(ratio)}${said.why ? ` (${said.why})` : ""}; distance from −1: ${figure(least)} at ${figure(where)} Hz`;
+  const SIDE = Math.min(WIDEST, at("plane").parentElement.clientWidth);  // so that its words have the page's size
   const x = v => SIDE / 2 + v / reach * SIDE / 2, y = v => SIDE / 2 - v / reach * SIDE / 2, parts = [];
   for (let k = -Math.floor(reach); k <= reach; k++) {
     parts.push(draw("path", { class: k ? "grid" : "axis", d: `M${x(k)} 0V${SIDE}M0 ${y(k)}H${SIDE}` }));
     if (k && k % Math.ceil(reach / 4) === 0) parts.push(draw("text", { class: "faint", x: within(x(k) - 4, 2, SIDE - 16), y: y(0) + 20 }, figure(k)), draw("text", { class: "faint", x: x(0) + 4, y: within(y(k) + 4, 11, SIDE - 4) }, `${figure(k)}j`));
   }
-  parts.push(draw("circle", { cx: x(0), cy: y(0), r: SIDE / 2 / reach, fill: "none", stroke: "#888" }), draw("circle", { cx: x(-1), cy: y(0), r: least * SIDE / 2 / reach, fill: "none", stroke: "#a11d1d", "stroke-dasharray": "5 4" }), draw("path", { d: `M${x(-1) - 6} ${y(0)}h12m-6 -6v12`, stroke: "#a11d1d", "stroke-width": 2 }));
+  parts.push(draw("circle", { cx: x(0), cy: y(0), r: SIDE / 2 / reach, fill: "none", style: "stroke:var(--circle)" }), draw("circle", { cx: x(-1), cy: y(0), r: least * SIDE / 2 / reach, fill: "none", style: "stroke:var(--bad)", "stroke-dasharray": "5 4" }), draw("path", { d: `M${x(-1) - 6} ${y(0)}h12m-6 -6v12`, style: "stroke:var(--bad)", "stroke-width": 2 }));
   for (let k = 0; k < held.loci.length / 2; k++) for (const side of [1, -1]) {
     const d = held.loci[2 * k].map((re, i) => `${i ? "L" : "M"}${x(re * factor).toFixed(1)} ${y(side * held.loci[2 * k + 1][i] * factor).toFixed(1)}`).join("");
-    parts.push(draw("path", { d, fill: "none", stroke: COLOURS[k % 2], "stroke-width": side > 0 ? 2 : 1, ...(side < 0 ? { "stroke-dasharray": "2 3" } : {}) }));
+    parts.push(draw("path", { d, fill: "none", style: `stroke:${COLOURS[k % 2]}`, "stroke-width": side > 0 ? 2 : 1, ...(side < 0 ? { "stroke-dasharray": "2 3" } : {}) }));
   }
   at("plane").setAttribute("viewBox", `0 0 ${SIDE} ${SIDE}`);
   at("plane").style.cssText = `max-width:${SIDE}px;overflow:hidden;border:1px solid var(--line)`;
@@ -68,7 +69,7 @@ function begin() {
     body.append(line);
   }
   at("ratios").append(head, body);
-  for (const [text, colour] of [["first locus", COLOURS[0]], ["second locus", COLOURS[1]], ["unit circle", "#888"], ["−1, and the distance from it", "#a11d1d"]]) {
+  for (const [text, colour] of [["first locus", COLOURS[0]], ["second locus", COLOURS[1]], ["unit circle", "var(--circle)"], ["−1, and the distance from it", "var(--bad)"]]) {
     const line = document.createElement("li"), mark = document.createElement("i");
     mark.style.background = colour;
     line.append(mark, text);
@@ -82,6 +83,7 @@ function begin() {
   }
   at("ratio").value = 500;
   at("ratio").addEventListener("input", paint);
+  addEventListener("resize", paint);
   paint();
 }
 begin();

@@ -2,10 +2,11 @@
 
 import json
 import re
+import time
 
 import pytest
 
-from orchestrator.face.cli import main, progress_lines
+from orchestrator.face.cli import explore, main, progress_lines
 from orchestrator.face.cli.progress_lines import ProgressLines
 from orchestrator.studies.points.parts_done import counting, join, parts_done, tally, tell_part
 
@@ -42,6 +43,21 @@ def test_a_command_that_ends_before_the_first_line_says_nothing(tmp_path, capsys
     asked = ["two_area", "--scenario", "gfor", "--vary", "grid.X_L=0.1:0.11:2", "--workers", "1"]
     assert main(["sweep", *asked, "--out", str(tmp_path)]) == 0
     assert lines_of(capsys.readouterr().err, "sweep") == []
+
+
+def test_a_page_that_is_saved_tells_how_far_it_is(often, tmp_path, capsys, monkeypatch):
+    def saved(path, case, desk, beginning, varied, report, *, further):
+        time.sleep(0.2)
+        report(3, 10)
+        time.sleep(0.2)
+
+    monkeypatch.setattr(explore, "save_page", saved)
+    assert main(["explore", "infinite_bus", "--save", str(tmp_path / "page.html")]) == 0
+    out, error = capsys.readouterr()
+    said = lines_of(error, "explore")
+    assert "preparing" in said[0]
+    assert any("3 of 10 points" in line for line in said)
+    assert lines_of(out, "explore") == []
 
 
 @pytest.mark.parametrize(

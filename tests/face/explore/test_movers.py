@@ -88,6 +88,14 @@ def test_a_slider_stays_within_the_declared_bounds_and_has_the_own_value():
     assert (below[0], below[-1]) == (-2.0, 0.0)
 
 
+def test_a_slider_rests_on_the_double_and_on_the_half():
+    for value in (200.0, 1.0, 0.37):
+        grid = grid_of({"value": value, "minimum": 0.0, "maximum": 1e5}, 12)
+        assert {value / 2, value, 2 * value} <= {*grid}
+        assert len(grid) == 13
+    assert 2.0 not in grid_of({"value": 1.0, "minimum": 0.5, "maximum": 1.9}, 12)
+
+
 def test_nothing_to_change_is_said():
     scenario = gfor.load("two_area").scenario("gfor")
     with pytest.raises(InputError, match="no value can be changed"):

@@ -156,7 +156,9 @@ function paintQuestions() {
     add(`What does ${off.replace(/\.enabled$/, "")} do?`, () => withValues({ [off]: !on }, `${off} = ${!on}`));
   }
   if (SAVED?.others) add("Which scenario damps most?", askBestScenario);
-  for (const name of Object.keys(SAVED?.grid ?? {}).slice(0, 3)) add(`Which ${name} damps most?`, () => askBest(name));
+  const sliders = Object.keys(SAVED?.grid ?? {}), doubled = sliders.filter(isDoubled), twice = doubled.find(name => name.endsWith(".K")) ?? doubled[0];
+  if (twice) add(`What if ${twice} is doubled?`, () => askDoubled(twice));
+  for (const name of sliders.slice(0, 3)) add(`Which ${name} damps most?`, () => askBest(name));
   add("What is a mode?", whatAModeIs);
   $("questions").replaceChildren(...questions);
 }

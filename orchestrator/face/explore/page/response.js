@@ -94,9 +94,11 @@ function plotOf(name) {
   for (const [kind, , text] of KINDS) if (kind !== "recorded" && seen.pinnedCurves[name]?.[kind]) curves.push({ data: seen.pinnedCurves[name][kind], look: " pinned-curve", text: `A, ${text}`, colour: "#e69f00" });
   return chartOf(name, curves, span, paintPlots);
 }
+// A chart is drawn as wide as it stands, so that its words have the page's size on any screen.
+const chartWidth = () => Math.min(760, Math.max(300, $("middle").clientWidth - 22));
 // Curves over the time; `span` is what is shown of it, and `again` paints all charts that share it.
 function chartOf(name, curves, span, again) {
-  const W = 760, H = 210, L = 64, R = 10, T = 8, B = 26;
+  const W = chartWidth(), H = 210, L = 64, R = 10, T = 8, B = 26;
   const x0 = span.from ?? Math.min(...curves.map(c => c.data[0][0])), x1 = span.to ?? Math.max(...curves.map(c => c.data[0].at(-1)), x0 + 1e-6);
   let low = Infinity, high = -Infinity;
   for (const c of curves) c.data[0].forEach((t, k) => { if (t >= x0 && t <= x1) { low = Math.min(low, c.data[1][k]); high = Math.max(high, c.data[1][k]); } });
@@ -104,7 +106,7 @@ function chartOf(name, curves, span, again) {
   low -= room; high += room;
   const x = t => L + (t - x0) / (x1 - x0) * (W - L - R), y = v => H - B - (v - low) / (high - low) * (H - T - B);
   const svg = draw("svg", { class: "chart", viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": `${name} over the time`, tabindex: 0 });
-  for (const t of ticks(x0, x1, 8)) svg.append(draw("path", { class: "grid", d: `M${x(t)} ${T}V${H - B}` }), draw("text", { class: "faint", x: x(t), y: H - 10, "text-anchor": "middle" }, number(t)));
+  for (const t of ticks(x0, x1, Math.ceil(W / 95))) svg.append(draw("path", { class: "grid", d: `M${x(t)} ${T}V${H - B}` }), draw("text", { class: "faint", x: x(t), y: H - 10, "text-anchor": "middle" }, number(t)));
   for (const v of ticks(low, high, 5)) svg.append(draw("path", { class: "grid", d: `M${L} ${y(v)}H${W - R}` }), draw("text", { class: "faint", x: L - 5, y: y(v) + 4, "text-anchor": "end" }, number(v, 6)));
   for (const c of curves) svg.append(draw("path", { class: `curve${c.look}`, stroke: c.colour, d: c.data[0].map((t, k) => [t, c.data[1][k]]).filter(([t]) => t >= x0 && t <= x1).map(([t, v], k) => `${k ? "L" : "M"}${x(t).toFixed(1)} ${y(v).toFixed(1)}`).join("") }));
   const line = draw("path", { class: "cursor" });

@@ -107,11 +107,22 @@ function stabilityOf(tried) {
   if (unstable.length === tried.length) return "Unstable at all of them. ";
   return stable.length + unstable.length === tried.length && stable.length < unstable.length ? `Stable at ${stable.join(", ")} only. ` : `Unstable at ${unstable.join(", ")}. `;
 }
-// ... and which value of a slider damps most, the others as they are.
-function askBest(name) {
+// The answer with one slider at a computed value, the others as they are.
+function answerWith(name, value) {
   const others = SAVED.movers ? {} : Object.fromEntries(Object.keys(SAVED.grid).map(one => [one, heldNear(one, state.values[one] ?? ownOf(one))]));
-  const answerAt = value => { const at = SAVED.movers && value === ownOf(name) ? {} : { ...others, [name]: value }; return SAVED.answers.find(one => one.scenario === state.scenario && Object.keys(one.values).length === Object.keys(at).length && Object.entries(at).every(([n, v]) => one.values[n] === v))?.answer; };
-  const tried = SAVED.grid[name].map(value => ({ value, answer: answerAt(value) })).filter(one => one.answer && leastOf(one.answer.modes.scenarios[0].modes));
+  const at = SAVED.movers && value === ownOf(name) ? {} : { ...others, [name]: value };
+  return SAVED.answers.find(one => one.scenario === state.scenario && Object.keys(one.values).length === Object.keys(at).length && Object.entries(at).every(([n, v]) => one.values[n] === v))?.answer;
+}
+// ... what the double of the case's value does, where it was computed, ...
+const isDoubled = name => ownOf(name) > 0 && SAVED.grid[name].includes(2 * ownOf(name));
+function askDoubled(name) {
+  const value = 2 * ownOf(name), show = make("button", {}, "show it");
+  show.addEventListener("click", () => setSaved(name, value));
+  sayElse(`With ${name} = ${number(value)}: ${swingOf(answerWith(name, value))}. Now: ${swingOf(seen.answer)}. `, show);
+}
+// ... and which value of a slider damps most.
+function askBest(name) {
+  const tried = SAVED.grid[name].map(value => ({ value, answer: answerWith(name, value) })).filter(one => one.answer && leastOf(one.answer.modes.scenarios[0].modes));
   const best = tried.reduce((one, other) => (leastDampingOf(other.answer) > leastDampingOf(one.answer) ? other : one));
   const show = make("button", {}, "show it");
   show.addEventListener("click", () => setSaved(name, best.value));

@@ -48,7 +48,7 @@ class Figures:
 
 def held_data(name: str, data: Any) -> str:
     """Data that a page holds as JSON, under an id; nothing in it is markup."""
-    text = json.dumps(data, ensure_ascii=False).replace("<", "\\u003c")
+    text = json.dumps(data, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
     return f'<script type="application/json" id="{name}">{text}</script>'
 
 
