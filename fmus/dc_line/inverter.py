@@ -56,7 +56,8 @@ def lcc_inverter_phasor() -> Model:
     most = closed * bridges.no_load(v_next) * most_cosine
     m.output("V_most", most, "kV", "DC voltage at the least angle, without a current")
     m.output("drop", bridges.drop, "ohm", "DC voltage lost by commutation, per current")
-    m.output("v", closed * seen, "pu", "Voltage of the bus; 0 behind an open breaker", base="bus")
+    text = "Voltage of the bus through one lag; 0 behind an open breaker"
+    m.output("v", closed * station.seen.once.magnitude(), "pu", text, base="bus")
     text = "By how much the DC voltage may exceed its order; much where the angle is held"
     m.output("beyond", if_else(holds_angle, NO_ORDER, 0), "kV", text)
     gamma = angle_of(bridges.cosine(seen, current, kilovolts(seen))) / DEGREE

@@ -243,6 +243,7 @@ class Triggers:
 def triggers_at_once(p: Given, v: Expr, far_v: Expr, inverter_kv: Expr) -> Triggers:
     """Return what acts at once, as all does in CDC4T.
 
+    ``v``, ``far_v``: through one lag alone, as an extrapolation goes 13.5 % beyond a step of the voltage;
     ``inverter_kv``: the inverter's voltage, as if it were not bypassed [kV]."""
     return Triggers(v, far_v, v < p.VBLOCK, v > p.VUNBL, inverter_kv < p.VBYPAS, far_v > p.VUNBY)
 

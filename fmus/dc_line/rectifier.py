@@ -112,8 +112,9 @@ def lcc_rectifier_phasor(records: str = CDC4T) -> Model:
     v, seen = station.seen.value.magnitude(), (measured.kilovolts, measured.current)
     now = line.flowing(v, seen)
     measured.follow(m, now.kilovolts, now.current)
-    low = line.without_bypass(v, seen).kilovolts
-    triggers = triggers_at_once(control.p, v, line.far.v, low)
+    judged = station.seen.once.magnitude()
+    low = line.without_bypass(judged, seen).kilovolts
+    triggers = triggers_at_once(control.p, judged, line.far.v, low)
     if delays is not None:
         triggers = delays.triggers(m, control, interruptions, triggers)
     close_interruptions(m, control, interruptions, triggers, low)

@@ -11,7 +11,9 @@ STEP = 1e-4
 
 NO_LOAD = 3 * math.sqrt(2) / math.pi
 LAG = 0.002
-"""Time constant of both lags of a measured bus voltage [s], of which 2·once − twice is what the control sees."""
+"""Time constant of both lags of a measured bus voltage [s], of which 2·once − twice is what the control sees.
+
+What blocks the line is judged by once."""
 
 
 def drop(p):
@@ -115,14 +117,17 @@ class Line:
         comes_back = min(self.share.values()) < 1
         ordered = (p["V_dc_0"] + p["RCOMP"] * self.I_0) * min(self.share["voltage"], 1)
         most = no_load(p, seen) * self.cosine
-        free = meeting(p, most, far, self.order(), ordered if holds or comes_back else None)
+        held = ordered if holds or comes_back else None
+        free = meeting(p, most, far, self.order(), held)
+        of_once = no_load(p, abs(self.once)) * self.cosine
+        judged = meeting(p, of_once, far, self.order(), held)
         blocked, bypassed = (self.since[x] is not None for x in ("blocked", "bypassed"))
         current, kilovolts = free
         if bypassed:
             current, kilovolts = min(self.order(), most / (drop(p) + p["R_dc"])), 0.0
         if blocked:
             current, kilovolts = 0.0, 0.0
-        self._switch(t, seen, far_v, free[1], comes_back)
+        self._switch(t, abs(self.once), far_v, judged[1], comes_back)
         self._ramp()
         self.V_m += STEP / p["TVDC"] * (kilovolts - self.V_m)
         self.I_m += STEP / p["TIDC"] * (current - self.I_m)

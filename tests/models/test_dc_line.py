@@ -223,6 +223,26 @@ def test_the_margin_keeps_the_current_the_inverter_then_holds():
     assert last["alpha"] == pytest.approx(p["ALFDY"])
 
 
+@pytest.mark.parametrize(("dip", "blocks"), [(0.65, False), (0.601, False), (0.59, True)])
+def test_a_dip_blocks_the_line_where_it_goes_below_vblock(dip, blocks):
+    """The voltage that the control sees goes 13.5 % of the dip beyond it: 0.60 pu in one to 0.65 pu."""
+    one = rectifier(VBLOCK=0.6, VUNBL=0.7, VBYPAS=-1.0)
+    found, _ = integrated(one, lambda t: at_rectifier(dip if t >= 0.01 else POINT["v_0"]), 0.06)
+    assert any(row["blocked"] for row in found) == blocks
+
+
+@pytest.mark.parametrize(("rise", "back"), [(0.69, False), (0.71, True)])
+def test_a_blocked_line_comes_back_where_its_bus_rises_above_vunbl(rise, back):
+    one = rectifier(VBLOCK=0.6, VUNBL=0.7, VBYPAS=-1.0, TBLOCK=0.02)
+
+    def at(t):
+        return at_rectifier(POINT["v_0"] if t < 0.01 else 0.4 if t < 0.05 else rise)
+
+    found, _ = integrated(one, at, 0.1)
+    assert found[45]["blocked"] == 1
+    assert (found[-1]["blocked"] == 0) == back
+
+
 def test_a_breaker_that_opens_blocks_the_line():
     one = rectifier(connected=False)
     found = one.outputs(at_rectifier())
