@@ -12,7 +12,7 @@ import orchestrator as gfor_in_python
 from orchestrator.core.errors import INTERRUPTED
 from orchestrator.studies.validation import fit
 from orchestrator.studies.validation.hidden import HiddenVoltage
-from orchestrator.studies.validation.parameters import Adjustable
+from orchestrator.studies.validation.parameters import Adjustable, Wanted
 from orchestrator.studies.validation.view import Validation, parts
 from tests.benchmarks.validation_draws import TRUTH, starts_of
 from tests.studies.validation.recordings import of_pmu, run, table, with_noise, written
@@ -208,3 +208,25 @@ def test_an_interval_holds_what_the_voltage_may_do_between_slow_samples():
     found = gfor_in_python.validate("gfor_phasor", frame, **given)
     (row,) = found.fitted().itertuples()
     assert row.low < 110 < row.high
+
+
+@pytest.mark.parametrize("reached", [True, False])
+def test_the_wrong_position_of_a_switch_is_fitted_once_where_the_other_one_will_do(
+    monkeypatch, reached
+):
+    fitted = []
+
+    def leaves(residuals, told, switches, best):
+        fitted.append(switches["on"])
+        good = switches["on"] and reached
+        best.cost, best.rms, best.values = (1.0, 1.0, {}) if good else (1e4, 100.0, {})
+
+    def start(residuals, told, switches):
+        return iter([told] * 5)
+
+    monkeypatch.setattr(fit, "_least_squares", leaves)
+    monkeypatch.setattr(fit, "_starts", start)
+    monkeypatch.setattr(fit, "identifiable", lambda residuals, numbers, switches: (numbers, {}))
+    wanted = Wanted([Adjustable("K", "1", start=80.0, low=0.0, high=1000.0)], ["on"])
+    fit._search(CreepingErrors(), wanted, [])
+    assert fitted == [False, True] if reached else sorted(fitted) == [False] * 5 + [True] * 5
