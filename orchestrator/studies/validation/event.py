@@ -24,6 +24,7 @@ from orchestrator.studies.validation.figures import (
     signals_of,
 )
 from orchestrator.studies.validation.filled import Mask, runs_of
+from orchestrator.studies.validation.frames import frames_of, grid_of_frames
 from orchestrator.studies.validation.other_event import ask_of_other_event
 from orchestrator.studies.validation.out_of_step import step_loss
 from orchestrator.studies.validation.parameters import NEVER
@@ -137,6 +138,10 @@ def prepare_event(
         asked.append(
             Question(QuestionKind.RATED_FREQUENCY, {"seen": seen, "rated": bases.rated_hz})
         )
+    grid = grid_of_frames(recording)
+    if grid is not None and abs(grid - bases.rated_hz) > _FARTHEST_HZ:
+        figures = {"frames": frames_of(recording), "grid": grid, "rated": bases.rated_hz}
+        asked.append(Question(QuestionKind.FRAMES, figures))
     asked += questions_of_level(recording, abs(voltage), start.power, bases)
     asked += _of_windows(recording, windows, before)
     unique = {one.kind: one for one in reversed(asked)}

@@ -22,6 +22,7 @@ from orchestrator.studies.validation.event import (
     rms_error,
     rms_movement,
 )
+from orchestrator.studies.validation.frames import RATED_HZ, frames_of, grid_of_frames
 from orchestrator.studies.validation.lagged import ask_of_lag
 from orchestrator.studies.validation.lost_jump import lost_jump
 from orchestrator.studies.validation.magnitude import ask_of_magnitude
@@ -51,7 +52,7 @@ _BASES_AWAY = (
 )  # how far a ratio of movements may be from the base: the device starts elsewhere
 _NEAR_PREFIX = 0.1  # part by which a factor may miss one of ten and be it
 _CURRENTS = ("ia", "ib", "ic")
-_RATED_HZ = (50.0, 60.0)  # of grids
+_FRAMES_LEAVE = 0.8  # part of the error that the frequency may leave for which the phasors speak
 _RADIAN = 180 / math.pi  # [deg]
 _OFF_ELSEWHERE = 0.06  # part of the movement, as above, of a voltage that is measured elsewhere
 _TRIED_REACTANCE = 0.12  # of a usual transformer [pu of the rating]
@@ -198,8 +199,26 @@ def question_readings(comparison: EventComparison, bases: PortBases) -> list[Que
     ]
     if whole > max(_LEAST_OFF, _OFF_ELSEWHERE * math.hypot(*moved)):
         explained += _meter_elsewhere(comparison, bases, whole)
+    if whole > _LEAST_OFF and _is_off_later(comparison):
         explained += _rated_otherwise(comparison, whole)
     return [min(explained, key=lambda one: one[0])[1]] if explained else []
+
+
+def _is_off_later(comparison: EventComparison) -> bool:
+    """Return whether the error is some part of the movement, in the whole or after the event alone.
+
+    During a fault P and Q move so far that a swing of another frequency is little beside it."""
+    event = comparison.event
+    recording = event.recording
+    error = comparison.played.power - recording.power
+    moved = recording.power - event.start.power
+    parts = [recording.times > event.windows.begin, recording.times > event.windows.end]
+    rms = [
+        [float(np.sqrt(np.mean(np.abs(one[part & recording.good]) ** 2))) for one in (error, moved)]
+        for part in parts
+        if (part & recording.good).any()
+    ]
+    return any(off > _OFF_ELSEWHERE * way for off, way in rms)
 
 
 def sign_that_starts(device: PlayedDevice, event: RecordedEvent, bases: PortBases) -> str:
@@ -391,20 +410,24 @@ def _time_unit(comparison: EventComparison, bases: PortBases, error: float) -> I
 def _rated_otherwise(comparison: EventComparison, error: float) -> Iterator[tuple[float, Question]]:
     """The other usual rated frequency, if it explains most of the error; phasors have none by themselves."""
     event, device = comparison.event, comparison.device
-    others = [one for one in _RATED_HZ if abs(one - device.rated_hz) > 1]
+    others = [one for one in RATED_HZ if abs(one - device.rated_hz) > 1]
     if "f_n" not in device.description.variables or len(others) != 1:
         return
     near, (hertz,) = cut_event(event, _AFTER, _BEFORE), others
     other = device.with_values({"f_n": hertz})
     here = math.hypot(*rms_error(comparison.near_power(near), near))
     left = math.inf
+    spoken_for = grid_of_frames(event.recording) == hertz
+    leaves = _FRAMES_LEAVE if spoken_for else _LEAVES_ALONE
     with device.trials.trial(f"f_n = {hertz:g}"):
         power = other.play(near.recording, near.start).power
-        if math.hypot(*rms_error(power, near)) > _LEAVES * here:
+        if math.hypot(*rms_error(power, near)) > max(_LEAVES, leaves) * here:
             return
         left = math.hypot(*rms_error(other.play(event.recording, event.start).power, event))
-    if left <= _LEAVES_ALONE * error:
+    if left <= leaves * error:
         figures = {"seen": hertz, "rated": device.rated_hz, "error": error, "left": left}
+        if spoken_for:
+            figures["frames"] = frames_of(event.recording)
         yield left / error, Question(QuestionKind.RATED_FREQUENCY, figures)
 
 

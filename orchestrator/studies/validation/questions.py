@@ -12,6 +12,7 @@ class QuestionKind(StrEnum):
     VOLTAGE_LEVEL = "voltage level"
     RATING = "rating"
     RATED_FREQUENCY = "rated frequency"
+    FRAMES = "phasors of another grid"
     ANGLE_UNIT = "angle unit"
     ANGLE_HELD = "angle held"
     POWER_HELD = "power held"
@@ -61,6 +62,7 @@ FIGURES_HOLD = {
     QuestionKind.NO_NOISE,
     QuestionKind.SHORT_BEFORE,
     QuestionKind.OVER_LIMIT,
+    QuestionKind.FRAMES,
 }
 """Kinds that are borne in mind, and leave a verdict standing; every other one keeps it open."""
 

@@ -15,6 +15,7 @@ from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.core.errors import InputError
 from orchestrator.core.late import interpolate
 from orchestrator.core.options import Option
+from orchestrator.output.results.readers import LINE_FREQUENCY
 from orchestrator.studies.validation.angle_questions import (
     questions_beside_frequency,
     questions_of_hold,
@@ -273,6 +274,7 @@ class _Reading:
 
     def ask_of_samples(self) -> None:
         """Ask about a channel that never moves, and about one sample that stands alone."""
+        self._ask_of_line()
         self._ask_of_repeated_rows()
         for role, read in _IN_PER_UNIT.items():
             if role not in self.channels:
@@ -309,6 +311,13 @@ class _Reading:
             if alone[most] > _SPIKE:
                 at = float(times[most + 1])
                 self.ask(QuestionKind.SPIKE, column=column, jump=float(alone[most]), at=at)
+
+    def _ask_of_line(self) -> None:
+        """Ask about a rated frequency that is none of the line which the recorder's file names."""
+        line = float(self.dataset.coords.get(LINE_FREQUENCY, 0.0))
+        if line and abs(line - self.bases.rated_hz) > _FARTHEST_HZ:
+            figures = {"seen": line, "rated": self.bases.rated_hz, "said": True}
+            self.ask(QuestionKind.RATED_FREQUENCY, **figures)
 
     def _ask_of_repeated_rows(self) -> None:
         columns = [

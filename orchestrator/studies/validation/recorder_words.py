@@ -37,14 +37,31 @@ def _rating(x: Figures) -> str:
 
 def _rated_frequency(x: Figures) -> str:
     if "left" in x:
+        frames = f"{_usual_frames(x, x['seen'])}, and " if "frames" in x else ""
         return (
-            f"is the rated frequency {x['seen']:g} Hz? The device has {x['rated']:g} Hz; with the other one "
+            f"is the rated frequency {x['seen']:g} Hz? The device has {x['rated']:g} Hz; {frames}with the other one "
             f"{fall_of_error(x)}. If it is so, give --set f_n={x['seen']:g}; if not, a droop of the model is wrong"
+        )
+    if x.get("said"):
+        return (
+            f"the recording says that its line has {x['seen']:g} Hz, and the device's is {x['rated']:g} Hz: give its "
+            f"rated frequency, as in --set f_n={x['seen']:g}, or another recording"
         )
     return (
         f"before the event the frequency is {x['seen']:.4g} Hz, and the device's is {x['rated']:g} Hz: give its rated "
         "frequency, as in --set f_n=60, or the channel's unit"
     )
+
+
+def _frames(x: Figures) -> str:
+    return (
+        f"{_usual_frames(x, x['grid'])}, and the device has {x['rated']:g} Hz: if it is of the other grid, give "
+        f"--set f_n={x['grid']:g}"
+    )
+
+
+def _usual_frames(x: Figures, hertz: float) -> str:
+    return f"{x['frames']:.3g} phasors a second are usual in grids of {hertz:g} Hz"
 
 
 def _angle_unit(x: Figures) -> str:
@@ -246,6 +263,7 @@ RECORDER_SENTENCES: Mapping[QuestionKind, Sentence] = {
     QuestionKind.VOLTAGE_LEVEL: _voltage_level,
     QuestionKind.RATING: _rating,
     QuestionKind.RATED_FREQUENCY: _rated_frequency,
+    QuestionKind.FRAMES: _frames,
     QuestionKind.ANGLE_UNIT: _angle_unit,
     QuestionKind.ANGLE_HELD: _angle_held,
     QuestionKind.ANGLE_AND_FREQUENCY: _angle_and_frequency,

@@ -8,8 +8,12 @@ import pytest
 from scipy.signal import lfilter
 
 import orchestrator as gfor_in_python
+from orchestrator.output.results.readers import LINE_FREQUENCY
 from orchestrator.studies.validation.clipped import clipped_run
 from orchestrator.studies.validation.limits import EXAMPLE
+from orchestrator.studies.validation.questions import QuestionKind
+from orchestrator.studies.validation.record import PortBases, read_recording
+from orchestrator.studies.validation.words import sentence
 from tests.studies.validation.recordings import of_pmu, run, table, waves, with_noise
 
 ON = {"pod_p.enabled": True}
@@ -494,6 +498,17 @@ def test_a_model_of_another_rated_frequency_is_asked_about(good):
     (question,) = asked(good, values={"f_n": 60.0})
     assert question["kind"] == "rated frequency"
     assert "--set f_n=50" in question["text"]
+
+
+def test_a_line_that_the_file_names_is_no_other_than_the_devices(good):
+    dataset = good.set_index("time").to_xarray()
+    for column, unit in (("v_pu", "pu"), ("angle_deg", "deg"), ("p_mw", "MW"), ("q_mvar", "Mvar")):
+        dataset[column].attrs["units"] = unit
+    for line, rated, count in ((50.0, 60.0, 1), (50.0, 50.0, 0), (0.0, 60.0, 0)):
+        named = dataset.assign_coords({LINE_FREQUENCY: line})
+        questions = read_recording(named, "rec", PortBases(1500.0, rated)).questions
+        assert [one.kind for one in questions] == count * [QuestionKind.RATED_FREQUENCY]
+        assert all("--set f_n=50" in sentence(one) for one in questions)
 
 
 @pytest.mark.parametrize("order", ["bca", "cab", "acb"])
