@@ -27,7 +27,8 @@ from orchestrator.linear.spectra.continuation import Eigenpair, pair_at, pairs_n
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.output.report.short_texts import first_few
 from orchestrator.simulation.watch.limits import limits_that_act
-from orchestrator.studies.modes.modes import ModesResult, changed, modes_from, running
+from orchestrator.studies.modes.modes import ModesResult, changed, modes_from
+from orchestrator.studies.operating_points.bench import PointBench
 from orchestrator.studies.sensitivities.derivative import Derivative, Shift, differentiate
 from orchestrator.studies.sensitivities.parameters import SHARE, Parameter, parameters_of
 from orchestrator.studies.sensitivities.request import SensitivitiesRequest
@@ -138,7 +139,8 @@ def find_sensitivities(
             Option.HELD
             + " holds the operating point, which a fixed parameter moves; give one of them"
         )
-    with running(prepared) as master:
+    with PointBench(remember=True) as bench:
+        master = bench.master(prepared)
         point = find_operating_point(master)
         blocks = Blocks(master, derivatives=True, directional=directional)
         found = modes_from(prepared, master, point, blocks, request.frequencies)
@@ -179,11 +181,14 @@ def find_sensitivities(
             else:
                 anew.append(parameter)
             report(len(rows), len(parameters))
-    for parameter in anew:
-        rows[parameter] = _row(
-            parameter, chosen, "moves", _started_anew(again, at, parameter, directional=directional)
-        )
-        report(len(rows), len(parameters))
+        for parameter in anew:
+            rows[parameter] = _row(
+                parameter,
+                chosen,
+                "moves",
+                _started_anew(again, at, parameter, directional=directional, bench=bench),
+            )
+            report(len(rows), len(parameters))
     unknown_name = next(
         (text for text in found.unnamed.values() if mode is None and not found.named), None
     )
@@ -332,17 +337,26 @@ def _in_running(
 
 
 def _started_anew(
-    again: Again, at: _Mode, parameter: Parameter, *, directional: bool
+    again: Again, at: _Mode, parameter: Parameter, *, directional: bool, bench: PointBench
 ) -> Callable[[float], Shift]:
     def shift(value: float) -> Shift:
-        with running(again({parameter.name: value})) as master:
-            try:
-                find_operating_point(master)
-            except AnalysisError as error:
-                raise AnalysisError(_NO_STEADY_STATE) from error
-            return at.shift(Blocks(master, derivatives=True, directional=directional), master)
+        master = bench.master(again({parameter.name: value}))
+        try:
+            return at.shift(_started(master, directional=directional), master)
+        except BaseException:  # what a failed FMU is worth after a reset is not known
+            bench.close()
+            raise
 
     return shift
+
+
+def _started(master: Master, *, directional: bool) -> Blocks:
+    """The linear models of a system with another value, in its own steady state."""
+    try:
+        find_operating_point(master)
+    except AnalysisError as error:
+        raise AnalysisError(_NO_STEADY_STATE) from error
+    return Blocks(master, derivatives=True, directional=directional)
 
 
 def _row(
