@@ -22,12 +22,24 @@ from fmus.toolchain.elimination_plan import plan_elimination
 from fmus.toolchain.fixed_values import with_fixed_apart
 from fmus.toolchain.model import Model
 from fmus.toolchain.symbols import Expr, Function, jtimes, jtimes_transposed, symbols
-from fmus.toolchain.symbols.operations import C, Op
+from fmus.toolchain.symbols.operations import LANES, C, Op
 
 
 def c_function(function: Function, name: str) -> str:
     """Text of ``static void name(const double **arg, double **res)``."""
-    lines = [f"static void {name}(const double **arg, double **res) {{\n  (void)arg, (void)res;\n"]
+    head = f"static void {name}(const double **arg, double **res)"
+    return _text(function, head, "double", C)
+
+
+def lanes_function(function: Function, name: str) -> str:
+    """The same of ``lanes``, which ``c/lanes.h`` declares."""
+    head = f"IN_PLACE void {name}(const lanes **arg, lanes **res)"
+    return _text(function, head, "lanes", LANES)
+
+
+def _text(function: Function, head: str, kind: str, forms: Mapping[int, str]) -> str:
+    lines = [f"{head} {{\n  (void)arg, (void)res;\n"]
+    number = "{}" if kind == "double" else "NUMBER({})"
     held: dict[int, str] = {}  # what holds the value of each place
     for k, (op, place, a, b, value) in enumerate(function.instructions):
         if op == Op.OUTPUT:
@@ -36,11 +48,11 @@ def c_function(function: Function, name: str) -> str:
         if op == Op.INPUT:
             text = f"arg[{a}][{b}]"
         elif op == Op.CONST:
-            text = repr(value).replace("inf", "INFINITY").replace("nan", "NAN")
+            text = number.format(repr(value).replace("inf", "INFINITY").replace("nan", "NAN"))
         else:
-            text = C[op].format(held[a], held[b])
+            text = forms[op].format(held[a], held[b])
         held[place] = f"v{k}"
-        lines.append(f"  double v{k}={text};\n")
+        lines.append(f"  {kind} v{k}={text};\n")
     return "".join([*lines, "}\n"])
 
 
@@ -94,6 +106,18 @@ def c_source(model: Model, further: Mapping[str, Function] | None = None) -> str
         "KERNEL int workspace_size(void) { return WORKSPACE; }",
     ]
     return "\n".join([*parts, ""])
+
+
+def lanes_source(model: Model) -> str:
+    """Return what a native FMU needs beside its kernel to step instances side by side; for explicit steps."""
+    apart = with_fixed_apart(model)
+    parts = [
+        "#ifdef STACKED",
+        lanes_function(apart.derivatives, "derivatives_lanes"),
+        lanes_function(apart.outputs, "outputs_lanes"),
+        "#endif",
+    ]
+    return "\n".join([(_C / "lanes.h").read_text(encoding="utf-8"), *parts])
 
 
 def _tables(lists: Mapping[str, list[int]]) -> str:

@@ -29,7 +29,7 @@ from fmus.toolchain.component import MANIFEST, PLATFORM, component_of, manifest
 from fmus.toolchain.description import model_description, with_guid
 from fmus.toolchain.exporter import this_machine
 from fmus.toolchain.extras import installed_version
-from fmus.toolchain.kernel import c_source, derivative_functions
+from fmus.toolchain.kernel import c_source, derivative_functions, lanes_source
 from fmus.toolchain.model import FmiVersion, Model
 from fmus.toolchain.tape import VERSION, tape_of
 
@@ -152,6 +152,8 @@ def native_source(model: Model, version: FmiVersion) -> str:
         (_C / "instance.c").read_text(encoding="utf-8"),
         (_C / f"fmi{version[0]}.c").read_text(encoding="utf-8"),
     ]
+    if version == "2.0" and model.integrator == "runge_kutta":
+        parts += [lanes_source(model), (_C / "stack.c").read_text(encoding="utf-8")]
     return "\n".join(parts)
 
 

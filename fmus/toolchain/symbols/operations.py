@@ -76,6 +76,34 @@ C = _SAME | {
 }
 """The same in C."""
 
+_BY_LANE = (Op.SIN, Op.COS, Op.TAN, Op.ATAN, Op.EXP, Op.LOG, Op.FABS, Op.FLOOR)
+_BY_PAIR = {
+    Op.ATAN2: "atan2",
+    Op.COPYSIGN: "copysign",
+    Op.POW: "pow",
+    Op.CONSTPOW: "pow",
+    Op.FMIN: "fmin",
+    Op.FMAX: "fmax",
+}
+LANES = (
+    C
+    | {op: f"EACH({C[op].partition('(')[0]}, {{0}})" for op in _BY_LANE}
+    | {op: f"EACH_PAIR({name}, {{0}}, {{1}})" for op, name in _BY_PAIR.items()}
+    | {
+        Op.SQRT: "__builtin_elementwise_sqrt({0})",
+        Op.LT: "TRUTH({0} < {1})",
+        Op.LE: "TRUTH({0} <= {1})",
+        Op.EQ: "TRUTH({0} == {1})",
+        Op.NE: "TRUTH({0} != {1})",
+        Op.AND: "TRUTH(({0} != 0) & ({1} != 0))",
+        Op.OR: "TRUTH(({0} != 0) | ({1} != 0))",
+        Op.NOT: "TRUTH({0} == 0)",
+        Op.IF_ELSE_ZERO: "WHERE({0} != 0, {1})",
+        Op.SIGN: "TRUTH({0} > 0) - TRUTH({0} < 0) + 0 * {0}",
+    }
+)
+"""The same in C on lanes, as ``c/lanes.h`` has them."""
+
 UNARY = {op for op, form in PYTHON.items() if "{1}" not in form}  # operations of one operand
 
 _scope: dict[str, Any] = {**NAMES, "atan": math.atan}
