@@ -29,6 +29,8 @@ class Component(Protocol):
     set_state: Any
     # as ``many_steps`` of many_steps.h, callable from C; None where each step is a call of its own
     many_steps: Any
+    # as ``gfor_step_stack`` of our native FMUs' stack.c, callable from C; None where each instance steps by itself
+    step_stack: Any
 
     def takes_many(self, steps: ctypes.Structure) -> bool:
         """Return whether ``many_steps`` makes these steps."""
@@ -126,6 +128,7 @@ class Derived(Closing):
 
     held_states: tuple[str, ...] = ()
     many_steps: Any = None
+    step_stack: Any = None
     set_state: Any = None
 
     def takes_many(self, steps: ctypes.Structure) -> bool:

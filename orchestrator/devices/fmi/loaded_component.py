@@ -178,6 +178,9 @@ class LoadedComponent(Derived):
         self.do_step = ctypes.CFUNCTYPE(ctypes.c_int, address, real, real, flag)(
             ("fmi2DoStep", library)
         )
+        if self._ours and self.one_thread is None:
+            # another's library may have a function of this name that does something else
+            self.step_stack = getattr(library, "gfor_step_stack", None)
 
     @property
     def one_thread(self) -> str | None:

@@ -95,6 +95,12 @@ _LOOKED_AT = 20
 """Communication steps over which a call's time is averaged; the least average of several counts, because others use
 the processor as well."""
 
+SIDE_BY_SIDE = 8
+"""Instances that step together: as many numbers as a wide register holds (``LANES`` of lanes.h)."""
+
+FEWEST = 3
+"""Instances that are sooner together than one by one."""
+
 # communication steps after which the calls are shared out anew
 _BALANCED_AT = (100, 1000, 10_000, 100_000)
 
@@ -117,7 +123,17 @@ class _Call(ctypes.Structure):
         ("tracks", ctypes.c_void_p),
         ("status", ctypes.c_int32),
         ("stage", ctypes.c_int32),
-        ("unused", ctypes.c_int64),
+        ("stack", ctypes.c_void_p),
+    )
+
+
+class _Stack(ctypes.Structure):
+    _fields_ = (
+        ("step", ctypes.c_void_p),
+        ("components", ctypes.c_void_p),
+        ("calls", ctypes.c_void_p),
+        ("status", ctypes.c_void_p),
+        ("n", ctypes.c_int64),
     )
 
 
@@ -161,8 +177,10 @@ def loop_library() -> Any | None:
 class CompiledLoop:
     """Steps a system in C.
 
-    The first communication steps are done by one thread; by what each call took then, the calls of a group are shared
-    out. Who does a call changes no value. Without a number of ``threads``, as many step as make a step shortest."""
+    Instances of one of our native FMUs step together, as many as a processor's registers take side by side. The first
+    communication steps are done by one thread; by what each call took then, the calls of a group are shared out. Who
+    does a call changes no value, nor who steps beside it. Without a number of ``threads``, as many step as make a step
+    shortest."""
 
     def __init__(
         self,
@@ -192,16 +210,17 @@ class CompiledLoop:
             first += len(group)
         for call, exchange in zip(self._calls, self._exchanges, strict=True):
             self._fill(call, exchange)
-        self._bound = np.array([e.component.one_thread is not None for e in self._exchanges])
         self._threads = threads
+        self._leader = np.arange(n)  # of each call: who is done for it too
+        self._stacks: list[tuple[_Stack, NDArray[Any], NDArray[Any], NDArray[Any]]] = []
+        self._led: list[list[int]] = [self._stack_up(group) for group in self._members]
+        self._bound = np.array([e.component.one_thread is not None for e in self._exchanges])
         self._team: Team | None = None
         self._kept: list[NDArray[Any]] = []
         self._trial = Trial() if threads is None else None
         self._done = self._looked = self._together = 0
         self._costs, self._spent_then = np.full(n, np.inf), np.zeros(n)
-        shareable = threads != 1 and any(
-            worth_sharing(group, self._bound) for group in self._members
-        )
+        shareable = threads != 1 and any(worth_sharing(group, self._bound) for group in self._led)
         self._balance_at = list(_BALANCED_AT) if shareable else []
 
     def _fill(self, call: _Call, exchange: Turn) -> None:
@@ -216,6 +235,38 @@ class CompiledLoop:
         _, call.output_references, call.n_outputs, call.outputs = exchange.outputs.arguments
         call.sources = exchange.delivered.ctypes.data
         call.tracks = self._tracks.address(exchange.window.start or 0)
+
+    def _stack_up(self, group: range) -> list[int]:
+        """Let calls of one function step together; returns the calls that are done by themselves or for others."""
+        alike: dict[int, list[int]] = {}
+        for call in group:
+            component = self._exchanges[call].component
+            if component.step_stack is not None:
+                key = ctypes.cast(component.step_stack, ctypes.c_void_p).value or 0
+                alike.setdefault(key, []).append(call)
+        for function, of in alike.items():
+            # each thread that is asked for gets its part
+            size = min(SIDE_BY_SIDE, -(-len(of) // (self._threads or 1)))
+            for first in range(0, len(of), size):
+                calls_together = of[first : first + size]
+                if len(calls_together) >= FEWEST:
+                    self._stack(function, calls_together)
+        return [call for call in group if self._leader[call] == call]
+
+    def _stack(self, function: int, members: list[int]) -> None:
+        components = np.array([self._calls[k].component for k in members], dtype=np.uint64)
+        places, status = np.array(members, dtype=np.int64), apart(len(members), np.int32)
+        stack = _Stack(
+            step=function,
+            components=components.ctypes.data,
+            calls=places.ctypes.data,
+            status=status.ctypes.data,
+            n=len(members),
+        )
+        self._stacks.append((stack, components, places, status))
+        self._leader[members] = members[0]
+        for call in members:
+            self._calls[call].stack = ctypes.addressof(stack)
 
     def advance(self, index: int, count: int, step_size: float) -> None:
         status = 0
@@ -272,7 +323,8 @@ class CompiledLoop:
             return
         if self._done >= self._looked + _LOOKED_AT:
             averages = (self._spent - self._spent_then) / (self._done - self._looked)
-            np.minimum(self._costs, averages, out=self._costs)
+            led = np.bincount(self._leader, averages, len(averages))
+            np.minimum(self._costs, led, out=self._costs)
             self._looked, self._spent_then = self._done, self._spent.copy()
         if self._done < self._balance_at[0]:
             return
@@ -283,17 +335,17 @@ class CompiledLoop:
     def _share(self) -> None:
         wanted = self._threads
         if wanted is None:
-            wanted = best_number(self._members, self._bound, self._costs, number_of_cores())
+            wanted = best_number(self._led, self._bound, self._costs, number_of_cores())
         if self._team is None and wanted > 1:
             self._team = Team(self._library, wanted)
         members = 1 if self._team is None else self._team.members
         self._kept = []
-        for group, entry in zip(self._members, self._groups, strict=True):
+        for group, entry in zip(self._led, self._groups, strict=True):
             entry.begin = None
             if members > 1 and worth_sharing(group, self._bound):
                 self._share_group(group, entry, members)
 
-    def _share_group(self, group: range, entry: _Group, members: int) -> None:
+    def _share_group(self, group: list[int], entry: _Group, members: int) -> None:
         found = shares(group, self._bound, self._costs, members)
         own, shared = (np.array(part, dtype=np.int64) for part in (found.own, sum(found.of, ())))
         begin = np.cumsum([0, *map(len, found.of)])
@@ -305,10 +357,11 @@ class CompiledLoop:
         entry.n_own = len(own)
         self._kept += [own, shared, begin]
         for part in (found.own, *found.of):
-            fresh = apart(sum(self._calls[call].n_outputs for call in part))
+            done = np.flatnonzero(np.isin(self._leader, part)).tolist()
+            fresh = apart(sum(self._calls[call].n_outputs for call in done))
             self._kept.append(fresh)
             place = fresh.ctypes.data
-            for call in part:
+            for call in done:
                 self._calls[call].fresh = place
                 place += 8 * self._calls[call].n_outputs
 

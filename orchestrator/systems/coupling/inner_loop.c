@@ -9,6 +9,18 @@ struct track {
     double low, high, last, change, turns;
 };
 
+/* Steps several instances of one library at once, as its `gfor_step_stack` (fmus/toolchain/c/stack.c). */
+typedef int (*step_together)(void *const *, size_t, double, double, int32_t *status);
+
+/* Calls of one group whose FMUs step together. The first of them leads: it is done for all. */
+struct stack {
+    step_together step;
+    void *const *components;
+    const int64_t *calls;
+    int32_t *status;
+    int64_t n;
+};
+
 /* As large as two lines of the processor's cache, so that threads do not write to the same one. */
 struct call {
     void *component;
@@ -21,8 +33,8 @@ struct call {
     double *fresh; /* where a thread leaves outputs until all have stepped */
     double spent; /* seconds for inputs and the FMU's functions, summed up */
     struct track *tracks; /* one for each output */
-    int32_t status, stage; /* of a thread's call that was refused */
-    int64_t unused;
+    int32_t status, stage; /* of a call that was refused */
+    const struct stack *stack; /* NULL where it steps by itself */
 };
 
 /* Calls that step side by side: from `first` to before `last`. Where threads share them, `own` are done by the caller
@@ -50,12 +62,18 @@ static int64_t follow(struct track *tracks, const double *values, int64_t n) {
     return -1;
 }
 
-/* Gather inputs, set them and step. What is refused is named in the call. */
-static int step_one(struct call *c, const double *y, double time, double step_size) {
+/* Gather inputs and set them. What is refused is named in the call. */
+static int give_one(struct call *c, const double *y) {
     for (int64_t i = 0; i < c->n_inputs; ++i) c->inputs[i] = y[c->sources[i]];
     c->stage = SET;
     if (c->n_inputs && (c->status = c->set_real(c->component, c->input_references, (size_t)c->n_inputs, c->inputs)) > 1)
         return c->status;
+    c->stage = NONE;
+    return 0;
+}
+
+static int step_one(struct call *c, const double *y, double time, double step_size) {
+    if (give_one(c, y)) return c->status;
     c->stage = STEP;
     if ((c->status = c->step(c->component, time, step_size, 1)) > 1) return c->status;
     c->stage = NONE;
@@ -77,19 +95,56 @@ struct now {
     double time, step_size;
 };
 
+static int leads(const struct now *now, const struct call *c) { return now->calls + c->stack->calls[0] == c; }
+
+static struct call *member(const struct now *now, const struct stack *of, int64_t k) { return now->calls + of->calls[k]; }
+
+/* As `step_one` for all calls of a stack. */
+static void step_stack(const struct now *now, const struct stack *of) {
+    int refused = 0;
+    for (int64_t k = 0; k < of->n; ++k) refused |= give_one(member(now, of, k), now->y);
+    if (refused || of->step(of->components, (size_t)of->n, now->time, now->step_size, of->status) <= 1) return;
+    for (int64_t k = 0; k < of->n; ++k) {
+        struct call *c = member(now, of, k);
+        c->status = of->status[k];
+        if (c->status > 1) c->stage = STEP;
+    }
+}
+
+static void read_fresh(struct call *c) {
+    if (c->stage == NONE) read_one(c, c->fresh);
+}
+
+/* A call of a thread, or those of the stack that it leads. */
 static void whole_call(void *of, int64_t which) {
     const struct now *now = of;
     struct call *c = &now->calls[which];
+    const struct stack *stack = c->stack;
     const double start = seconds();
-    if (!step_one(c, now->y, now->time, now->step_size)) read_one(c, c->fresh);
-    c->spent += seconds() - start;
+    if (!stack) {
+        if (!step_one(c, now->y, now->time, now->step_size)) read_one(c, c->fresh);
+        c->spent += seconds() - start;
+        return;
+    }
+    step_stack(now, stack);
+    for (int64_t k = 0; k < stack->n; ++k) read_fresh(member(now, stack, k));
+    const double each = (seconds() - start) / (double)stack->n;
+    for (int64_t k = 0; k < stack->n; ++k) member(now, stack, k)->spent += each;
 }
 
-static int timed_step(const struct now *now, struct call *c) {
+/* Step a call, or the stack that it leads; one that follows was stepped then. */
+static void timed_step(const struct now *now, struct call *c) {
+    const struct stack *stack = c->stack;
+    if (stack && !leads(now, c)) return;
     const double start = seconds();
-    const int status = step_one(c, now->y, now->time, now->step_size);
-    c->spent += seconds() - start;
-    return status;
+    if (!stack) {
+        step_one(c, now->y, now->time, now->step_size);
+        c->spent += seconds() - start;
+        return;
+    }
+    step_stack(now, stack);
+    const double each = (seconds() - start) / (double)stack->n;
+    for (int64_t k = 0; k < stack->n; ++k) member(now, stack, k)->spent += each;
 }
 
 static int timed_reading(struct call *c) {
@@ -105,7 +160,8 @@ static int step_group(const struct now *now, const struct group *g, struct team 
     if (together) team_do(team, g->own, g->n_own, g->shared, g->begin);
     for (int64_t i = g->first; i < g->last; ++i) {
         struct call *c = &now->calls[i];
-        if (together ? c->stage == SET || c->stage == STEP : timed_step(now, c)) {
+        if (!together) timed_step(now, c);
+        if (c->stage == SET || c->stage == STEP) {
             failure[1] = i, failure[2] = c->stage;
             return c->status;
         }

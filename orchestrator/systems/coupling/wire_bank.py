@@ -93,6 +93,7 @@ class WireBank:
 
     name = "connections"
     one_thread = "no FMU"
+    step_stack = None
 
     def __init__(
         self,
