@@ -15,6 +15,7 @@ from orchestrator.cases.flow.power_flow import PowerFlow
 from orchestrator.cases.form.build_choices import CHOICES
 from orchestrator.cases.form.names import close_names
 from orchestrator.cases.form.unusual_value import UnusualValue
+from orchestrator.cases.questions.dead_bands import dead_band_doubts
 from orchestrator.cases.questions.plausible_networks import network_doubts
 from orchestrator.cases.questions.plausible_ranges import SMALLEST_SHARE
 from orchestrator.cases.questions.plausible_sources import SOLVED, source_doubts
@@ -224,6 +225,7 @@ def _doubts(draft: Draft) -> Iterator[UnusualValue]:
     yield from network_doubts(draft)
     yield from source_doubts(draft)
     yield from _ratings(draft)
+    yield from dead_band_doubts(draft)
 
 
 def _long_step(draft: Draft) -> Iterator[Problem]:

@@ -654,7 +654,7 @@ def test_a_resistance_above_its_reactance_is_asked_about(R, X, asked, monkeypatc
     monkeypatch.setattr(plausibility, "RESISTANCES", (("R", "X"),))
     monkeypatch.setattr(plausibility, "value_of", lambda plan, name: {"R": R, "X": X}.get(name))
     monkeypatch.setattr(plausibility, "place_of", lambda *_: "here")
-    for name in ("_small_units", "network_doubts", "source_doubts", "_ratings"):
+    for name in ("_small_units", "network_doubts", "source_doubts", "_ratings", "dead_band_doubts"):
         monkeypatch.setattr(plausibility, name, lambda draft: ())
     draft = SimpleNamespace(system=SimpleNamespace(components={"a": plan}))
     assert [doubt.name for doubt in plausibility._doubts(draft)] == ["a.R"] * asked

@@ -174,13 +174,17 @@ def test_a_lead_without_a_lag_is_asked_about(questions, record, times, asked):
     assert len(said) == asked
 
 
-@pytest.mark.parametrize(("place", "said"), [(0, "hysteresis"), (1, "backlash")])
-def test_what_a_governor_of_wecc_leaves_out_is_asked_about(questions, place, said):
-    bands = ["0.0006", *("0.001" if k == place else "0" for k in range(2))]
-    record = (
-        f"3 'WSIEG1' 1 0 0 20 0 0 0.1 1 -10 1 0 0.3 0.3 0 7 0.3 0 0.6 0.4 0 0 0 0 {' '.join(bands)}"
-    )
-    (asked,) = questions(dyr=changed(DYR, (TGOV1, f"{record} {'0 ' * 11}/")))
+@pytest.mark.parametrize(
+    ("bands", "said"),
+    [
+        ("0 0.001 0", "WSIEG1 has err = 0.001: the hysteresis"),
+        ("0 0 0.001", "WSIEG1 has db2 = 0.001: the backlash"),
+        ("0.0006 0 0", "governor.db_1 = 0.0006: the operating point rests within this dead band"),
+    ],
+)
+def test_bands_of_a_governor_of_wecc_are_asked_about(questions, bands, said):
+    record = f"{WSIEG1.removesuffix('0 0 0 0 0 0 0 0 0 0 0 0 0 0 /')}{bands} {'0 ' * 11}/"
+    (asked,) = questions(dyr=changed(DYR, (TGOV1, record)))
     assert said in asked
 
 
