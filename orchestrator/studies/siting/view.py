@@ -147,8 +147,13 @@ def answer_in_parts(result: SiteResult) -> tuple[str, str]:
     others = ", ".join(f"{bus} {100 * result.least(bus)[0] / most:.0f} %" for bus in best[1:])
     tried = [one for one in result.confirmations if one.bus == best[0] and not one.failure]
     then = "".join(f"; as it is now, {with_it(one)}" for one in tried)
+    moved = result.shifts[DEVICE][at][mode.label][best[0]]
+    is_place = f"is the best place for {device_title(result)}{among}"
+    if moved.hardly:
+        part = f"{100 * moved.part:.1g} % of what the strongest place does"
+        is_place = f"is hardly a place for {device_title(result)}, with {part}"
     return (
-        f"{best[0]} is the best place for {device_title(result)}{among}: {shift_text(result, most)} "
+        f"{best[0]} {is_place}: {shift_text(result, most)} "
         f"{unit(result, '100')}, for the least damped mode{after} ({_called(mode)}){then}",
         f"; of that {others}" if others else "",
     )
