@@ -41,6 +41,7 @@ class CauseKind(StrEnum):
     POSITION = "position"
     DELAY = "delay"
     LIMIT = "limit"
+    PAIR = "pair"
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,7 @@ class Explanation:
     left: float
     noise: float = 0.0
     beside: Mapping[str, float] = field(default_factory=dict)  # another number with its value
+    beside_now: Mapping[str, float] = field(default_factory=dict)  # of a pair, in the model
     outdone: bool = False  # whether another cause leaves clearly less
 
     @property
@@ -108,6 +110,7 @@ class Explanation:
             "now": self.now,
             "value": self.value,
             "with": dict(self.beside),
+            "with_now": dict(self.beside_now),
             "rms_now_pu": self.error,
             "rms_left_pu": self.left,
             "share": self.share,

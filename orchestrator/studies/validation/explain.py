@@ -26,6 +26,7 @@ from orchestrator.studies.validation.cause_numbers import (
     numbers_by_slope,
     promises_of,
 )
+from orchestrator.studies.validation.cause_pairs import pair_of_numbers
 from orchestrator.studies.validation.causes import (
     CauseKind,
     CauseSearch,
@@ -133,16 +134,19 @@ def _causes(
 ) -> Iterator[Explanation]:
     """Causes as they are found, the quickest first.
 
-    Numbers are tried far from where they are, and limits at levels, only if what was found leaves more than the
-    scatter. A run that is held in step takes three times as long: there the former is done if nothing explains."""
+    Numbers are tried far from where they are, limits at levels, and two numbers at once, only if what was found leaves
+    more than the scatter. A run that is held in step takes three times as long: there the former is done if nothing
+    explains, and the last not at all."""
     looked_at = _looked_at(device, events)
     bench = CauseBench(device, looked_at, report)
     rough = bench if device.rough is device else CauseBench(device.rough, looked_at, report)
     told = explained = False
+    best: Explanation | None = None
 
     def seen(causes: Iterator[Explanation]) -> Iterator[Explanation]:
-        nonlocal told, explained
+        nonlocal told, explained, best
         for one in causes:
+            best = one if best is None or one.left < best.left else best
             explained = explained or one.explains
             told = told or (one.explains and not one.leaves_much)
             yield one
@@ -157,7 +161,9 @@ def _causes(
         yield from seen(levels_of_limits(bench, rough))
     enough = explained if device.gives_way else told
     if far and not enough and bench.misses:
-        yield from numbers_by_factors(bench, rough, promises)
+        yield from seen(numbers_by_factors(bench, rough, promises))
+    if not told and best is not None and not device.gives_way:
+        yield from pair_of_numbers(bench, rough, best)
 
 
 def _looked_at(device: PlayedDevice, events: Sequence[RecordedEvent]) -> list[RecordedEvent]:

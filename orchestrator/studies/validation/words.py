@@ -392,8 +392,9 @@ def _said_of_causes(explanations: Sequence[Explanation]) -> str:
             f"No cause by itself explains most of the error; the nearest is {_cause(best)}, with {best.share:.0%} of "
             "the squared error beyond the scatter."
         )
-    said = f"The likeliest cause is {_cause(best)}: "
-    said += f"it explains {best.share:.0%} of the squared error beyond the scatter."
+    are, they = ("causes are", "they explain") if best.beside_now else ("cause is", "it explains")
+    said = f"The likeliest {are} {_cause(best)}: "
+    said += f"{they} {best.share:.0%} of the squared error beyond the scatter."
     alike = [one for one in explanations[1:] if one.name != best.name and one.explains]
     if best.leaves_much:
         times = f", {best.left / best.noise:.0f} times the scatter" if best.noise > 0 else ""
@@ -427,6 +428,13 @@ def _cause(one: Explanation) -> str:
             return f"{what} coming {abs(one.value):.3g} s {way} in the plant"
         case CauseKind.LIMIT:
             return f"a current that the plant limits to {one.value:.4g}{unit}"
+        case CauseKind.PAIR:
+            others = [
+                f" together with {name} = {value_text(x)} (now {value_text(one.beside_now[name])})"
+                for name, x in one.beside.items()
+            ]
+            first = f"{one.name} = {value_text(one.value)}{unit} (now {value_text(one.now)})"
+            return first + "".join(others)
         case _:
             return f"{one.name} = {value_text(one.value)}{unit}{beside} (now {value_text(one.now)})"
 

@@ -63,6 +63,20 @@ def test_a_number_that_is_off_by_four_is_named_alone(name, plants):
     assert not any(one.explains for one in others)
 
 
+@pytest.mark.parametrize("also", [{"droop.R_f": 0.04}, {}])
+def test_two_numbers_that_are_off_at_once_are_named_together_and_one_alone(also):
+    frame = with_noise(table(run("pod_p", stop=3.0, gfor__pod_p__K=120.0)))
+    causes = explained(frame, values=ON | {"pod_p.K": 90.0} | also, step="500 us")
+    best, *others = causes
+    assert (best.name, best.value) == ("pod_p.K", pytest.approx(120, rel=0.01))
+    assert best.beside == pytest.approx(dict.fromkeys(also, 0.05), rel=0.01)
+    assert best.beside_now == also
+    assert not best.leaves_much
+    assert [one.name for one in others if one.cause is CauseKind.PAIR] == []
+    said = explanation_sentence(causes)
+    assert ("together with droop.R_f" in said) == bool(also)
+
+
 class TwoValleys:
     """A bench whose error has a valley at the model's value and a deeper one at four times it."""
 
