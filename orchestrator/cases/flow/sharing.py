@@ -199,10 +199,12 @@ def _overload(reserves: Sequence[Reserve], change: float, left: str) -> str:
         able, key=lambda one: (one.before + step * one.gain) / one.most if one.most > 0 else 0.0
     )
     need = worst.before + step * worst.gain
-    if change > 0:
+    if change > 0 and worst.most > 0:
         first = (
             f"{worst.name} would need {100 * need / worst.most:.0f} % of its {worst.most:.4g} MW"
         )
+    elif change > 0:
+        first = f"{worst.name} would need {need:.4g} MW, where its most is {worst.most:.4g} MW"
     else:
         first = f"{worst.name} would have to go down to {need:.4g} MW"
     return (

@@ -88,6 +88,13 @@ def test_shares_follow_the_gains_until_a_limit():
         assert caught.value.kind is ErrorKind.START
 
 
+def test_units_without_room_are_told_in_megawatts():
+    """A file with PT = 0 of all machines: no share of 0 MW is told."""
+    words = "a would need 56.67 MW, where its most is 0 MW: 20 MW more cannot be shared, 20 MW are"
+    with pytest.raises(InputError, match=re.escape(words)):
+        shares([Reserve("a", 50, 1, 0, 0), Reserve("b", 9, 2, 0, 0)], 20)
+
+
 def test_a_units_droop_and_limits_are_those_of_its_model(five):
     (prepared,) = five.prepare(["base"])
     plans = prepared.system.components
