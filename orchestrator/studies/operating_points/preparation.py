@@ -35,6 +35,17 @@ _OPERATING = {"P_0", "Q_0", "v_0", "theta_0", "S_n", "connected"}
 
 _SHOWN = 4
 
+_REGULATOR = {"exciter.delta_V_ref", "exciter.E_fd"}
+"""Variables of which a machine with an exciter, its own or one from outside, has one."""
+
+_ASKED_OF_FIELD = (
+    0.01  # change of a machine's Q [pu, S_n] from which on its voltage was held for it
+)
+_HELD_FIELDS = (
+    "the new power flow holds the voltages of machines whose field no exciter moves, as a planner's does: it is the "
+    "point after somebody has set them, and in a run their fields stay; what the outage itself leaves, a run shows"
+)
+
 
 class IslandingError(InputError):
     """An outage leaves no system."""
@@ -208,6 +219,23 @@ class ItemPreparation:
         already = {one.bus for one in before}
         found = [] if limits is False else [x for x in now if x.bus not in already]
         return max(found, key=lambda x: abs(x.q - x.limit)).text(kept=False) if found else ""
+
+    def held_fields(self, prepared: PreparedScenario) -> tuple[str, ...]:
+        """A sentence where the new power flow asks constant fields of machines for another reactive power."""
+        before, now = self.base.power_flow, prepared.power_flow
+        if before is None or now is None:
+            return ()
+        constant = [
+            name
+            for name, plan in prepared.system.components.items()
+            if plan.kind == "machine" and not _REGULATOR & set(plan.description.variables)
+        ]
+        asked = any(
+            abs(now.powers[name].imag - before.powers[name].imag) > _ASKED_OF_FIELD
+            for name in constant
+            if name in before.powers and name in now.powers
+        )
+        return (_HELD_FIELDS,) if asked else ()
 
     def _prepare(
         self,

@@ -229,6 +229,8 @@ class _Worker:
                 loaded = loadings(flow, limits, prepared.dead)
                 outside = outliers(flow, limits, prepared.dead)
             warnings = self._preparation.warnings(prepared.scenario)
+            if item.out:
+                warnings = (*warnings, *self._preparation.held_fields(prepared.scenario))
             found = self._modes(prepared.scenario, neighbour, warnings, count=count)
             beyond, fed = (
                 self._preparation.overloads(prepared.scenario),

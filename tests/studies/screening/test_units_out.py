@@ -91,3 +91,14 @@ def test_a_search_without_an_end_gives_way_to_all_eigenvalues(tmp_path, monkeypa
         Status.MODES,
         "the search does not converge",
     )
+
+
+@pytest.mark.parametrize(("scenario", "told"), [("manual", True), ("thyristor", False)])
+def test_an_outage_says_that_its_power_flow_holds_the_voltage_of_a_constant_field(
+    scenario, told, tmp_path
+):
+    result = screened(load_case("kundur"), tmp_path, "name\nonly\n", "tie_7_8_1", scenario)
+    intact, lost = result.items
+    words = "the new power flow holds the voltages of machines whose field no exciter moves"
+    assert not any(words in text for text in intact.record.warnings)
+    assert any(words in text for text in lost.record.warnings) == told
