@@ -21,14 +21,6 @@ _WIDE = 4.0  # from the ratio that was asked for, divided by this, to as many ti
 _DIGITS = 5  # of a number that the page holds
 _POINTS = 1200  # of a locus that the page draws, at most
 
-_COLOURS = """:root { --one: #0072b2; --two: #d55e00; --circle: #777; }
-@media screen and (prefers-color-scheme: dark) {
-  :root { --one: #56b4e9; --two: #f0935a; --circle: #98a4b0; }
-  #plane, #key { background: none; color: inherit; padding-left: 0; } #plane text { fill: var(--soft); }
-  #plane .grid { stroke: #2a333c; } #plane .axis { stroke: #55606b; }
-}"""
-"""The picture is made for the screen, so that it follows a dark window."""
-
 
 @dataclass(frozen=True)
 class JudgedRatio:
@@ -89,9 +81,12 @@ def ratio_page(result: CutResult) -> str:
     findings = (
         '<div class="findings"><p id="verdict" aria-live="polite"></p><p id="boss"></p></div>'
     )
-    script = (Path(__file__).parent / "ratio_page.js").read_text(encoding="utf-8")
+    script, style = (
+        (Path(__file__).parent / f"ratio_page.{kind}").read_text(encoding="utf-8")
+        for kind in ("js", "css")
+    )
     drawn = (
-        f"<style>{_COLOURS}</style>"
+        f"<style>{style}</style>"
         '<p><label>Short-circuit ratio <input id="ratio" type="range" min="0" max="1000" step="1" '
         'style="width:min(100%,560px)"> <output id="shown"></output></label></p>'
         '<svg id="plane" class="chart" role="img" aria-label="Eigenloci of Z·Y"></svg>'
