@@ -16,6 +16,7 @@ class Option(Spelling, Enum):
 
     AGAINST = "against", ALONE
     AMBIENT = "ambient", ALONE
+    AMPLITUDE = "amplitude"
     ANGLE = "angle"
     AT = "at"
     BESIDE = "beside"

@@ -57,7 +57,8 @@ class Admittance:
             f"Largest bound of a line: {self.response.largest_bound:.2g} of it; "
             f"error of the model: {self.model.error:.2g}"
         )
-        return page(repr(self)[1:-1], [f"Can feed an oscillation: {bands or 'nowhere'}", accuracy])
+        told = [f"Can feed an oscillation: {bands or 'nowhere'}", accuracy, *self.response.warnings]
+        return page(repr(self)[1:-1], told)
 
     def __repr__(self) -> str:
         content = self.as_json()

@@ -14,7 +14,7 @@ from orchestrator.face.api.admittance import Admittance, admittance
 from orchestrator.face.cli.arguments import add_options, switch
 from orchestrator.face.cli.by_point import by_point
 from orchestrator.face.cli.case_arguments import add_excitation_arguments, excitation_of
-from orchestrator.face.cli.terminal import make_console, print_json, said_stages
+from orchestrator.face.cli.terminal import make_console, print_json, said_stages, say
 from orchestrator.linear.spectra.modes import damping_percent
 from orchestrator.output.report.terminal_tables import make_table
 from orchestrator.output.results.file_writers import save_table
@@ -51,6 +51,7 @@ def run(options: argparse.Namespace) -> int:
         return 0
     else:
         found, files = _measured(options, {}, folder)
+        say("warning", found.response.warnings)
         if options.json:
             print_json(found.as_json())
             return 0
@@ -118,7 +119,7 @@ def _row(found: Admittance) -> dict[str, Any]:
         "damping_percent": damping_percent(worst),
         "not_passive": bands,
         "least_index": float(found.passivity.relative.min()),
-        "remark": "",
+        "remark": "; ".join(found.response.warnings),
     }
 
 

@@ -49,6 +49,8 @@ def identification_json(
         ),
         "feedthrough": response.feedthrough.tolist(),
         "largest_relative_bound": response.largest_bound,
+        "difference_at_half_amplitude": response.nonlinearity,
+        "warnings": list(response.warnings),
         "model": {
             "order": len(model.A),
             "error": model.error,

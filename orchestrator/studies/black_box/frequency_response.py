@@ -6,7 +6,7 @@ M(z) = Σ m[k]·z^(−k−1) at z = e^(jωH), where m is the response to u = 1, 
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import chain, repeat
-from math import ceil
+from math import ceil, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +73,13 @@ _AWAY = 0.1
 more than this part of its size has left the operating point."""
 
 
+_LINEAR = 5e-4
+"""Largest difference of two responses, at an amplitude and at half of it, as a part of them, up to which nobody is
+warned: from here on fitted models of our converters had poles too many."""
+_AIMED = 1e-4
+"""The difference at the amplitude that a warning advises; it grows with the amplitude's square."""
+
+
 @dataclass(frozen=True)
 class Excitation:
     # ``multisine``: periods of many sines until they repeat. ``pulse``: one step up and one step down, each followed
@@ -108,6 +115,9 @@ class FrequencyResponse:
     outputs: tuple[str, ...]
     seconds: float  # time simulated on the bench [s]
     method: str
+    amplitude: float = 0.0  # largest deviation of an input [its unit]
+    # largest difference from the response at half the amplitude, relative to it at the same frequency (2-norms)
+    nonlinearity: float = 0.0
 
     @property
     def z(self) -> Complex:
@@ -121,8 +131,21 @@ class FrequencyResponse:
     @property
     def largest_bound(self) -> float:
         """Largest bound of all frequencies, relative to the response at the same frequency (2-norms)."""
-        size = np.linalg.norm(self.values, ord=2, axis=(1, 2))
-        return float((np.linalg.norm(self.bounds, ord=2, axis=(1, 2)) / size).max())
+        return _largest_part(self.bounds, self.values)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A sentence where the response depends on the amplitude, so that a model of it may have poles of its own."""
+        if self.nonlinearity <= _LINEAR:
+            return ()
+        smaller = self.amplitude * sqrt(_AIMED / self.nonlinearity)
+        apart = f"{100 * self.nonlinearity:.2g} %"
+        return (
+            f"at half the amplitude of {self.amplitude:g} the response differs by up to {apart}: it is not that of "
+            "small changes, and the fitted model may have poles that the device does not have; take "
+            + Option.AMPLITUDE
+            + f" {smaller:.1g}",
+        )
 
     def continuous(self) -> Complex:
         """The response of the device itself, without the hold: M over (1 − e^(−jωH))/(jωH).
@@ -144,7 +167,7 @@ def measure(
             "shorter step or a lower highest frequency"
         )
     values = np.zeros((len(lines), len(bench.outputs), len(bench.inputs)), dtype=complex)
-    bounds = np.zeros(values.shape)
+    bounds, differences = np.zeros(values.shape), np.zeros(values.shape)
     seconds = 0.0
     told, runs_in_all = report or (lambda text: None), 2 * len(bench.inputs)
     told(f"{bench.description.path.name}: brought to rest at an ideal bus")
@@ -164,10 +187,25 @@ def measure(
             (full, at_full), (half, at_half) = found
             # The error of lowest order grows with the square of the amplitude: from both it can be taken out.
             values[:, :, column] = half + (half - full) / 3
+            differences[:, :, column] = np.abs(half - full)
             bounds[:, :, column] = np.abs(half - full) + np.maximum(at_full, at_half)
     names = tuple(bench.inputs), tuple(bench.outputs)
     measured = np.asarray(frequencies, dtype=float), values, bounds, direct, operating_point
-    return FrequencyResponse(*measured, bench.step_size, *names, seconds, excitation.method)
+    return FrequencyResponse(
+        *measured,
+        bench.step_size,
+        *names,
+        seconds,
+        excitation.method,
+        amplitude=excitation.amplitude,
+        nonlinearity=_largest_part(differences, values),
+    )
+
+
+def _largest_part(parts: Numbers, values: Complex) -> float:
+    """The largest of some parts of a response, relative to it at the same frequency (2-norms)."""
+    size = np.linalg.norm(values, ord=2, axis=(1, 2))
+    return float((np.linalg.norm(parts, ord=2, axis=(1, 2)) / size).max())
 
 
 def _by_multisine(

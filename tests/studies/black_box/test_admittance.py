@@ -68,6 +68,8 @@ def test_amplitudes_that_leave_the_linear_range_show_in_the_bounds():
     )
     error = np.abs(large.values - small.values)
     assert large.largest_bound > 5 * small.largest_bound
+    assert large.nonlinearity / small.nonlinearity == pytest.approx(30**2, rel=0.1)
+    assert not small.warnings
     assert (error <= 2 * large.bounds + 1e-6 * np.abs(small.values)).mean() > 0.5
 
 
