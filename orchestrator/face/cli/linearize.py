@@ -48,10 +48,5 @@ def run(options: argparse.Namespace) -> int:
         if exceptions:
             lines.append(exceptions)
     print_stability(make_console(), verdicts)
-    zero = [title for title, verdict in verdicts.items() if verdict.zeros == 1]
-    if zero:
-        print(
-            f"{', '.join(zero)}: one eigenvalue, taken for that of the free angle, is zero, and left out of the largest"
-        )
     print("\n".join(lines))
     return exit_code(options, list(verdicts.values()))

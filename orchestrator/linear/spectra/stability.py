@@ -198,7 +198,7 @@ class Stability(NoTruth):
         if self.mode is None or self.stable is None:
             return self.reason or "there is no eigenvalue but zeros"
         tail = f"; {self.reason}" if self.reason else ""
-        if self.zeros > 1:
+        if self.zeros:
             tail += f"; {zeros_in_words(self.zeros)}"
         if self.stable:
             where = self._where(self.mode)
@@ -246,6 +246,8 @@ class Stability(NoTruth):
 
 
 def zeros_in_words(zeros: int) -> str:
+    if zeros == 1:
+        return "one eigenvalue is zero, taken for that of the free angle, and left out"
     return f"{zeros} eigenvalues are zero, one of them may be the free angle: nothing restores the others"
 
 

@@ -28,10 +28,7 @@ def test_the_files_hold_the_model_with_its_names(tmp_path, capsys):
     assert code == 0
     said = capsys.readouterr().out
     assert "62 states, 1 inputs, 7 outputs" in said
-    free = (
-        "SG + GFOR: one eigenvalue, taken for that of the free angle, is zero, and left out of the"
-    )
-    assert free in said  # largest real part of all, the line above says
+    assert "one eigenvalue is zero, taken for that of the free angle, and left out" in said
     content = scipy.io.loadmat(tmp_path / "gfor" / "linear_model.mat", simplify_cells=True)
     assert content["step_size"] == 0
     assert content["A"].shape == (62, 62)
