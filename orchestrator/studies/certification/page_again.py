@@ -41,7 +41,7 @@ def look_at_page(folder: Path, content: dict[str, Any], data: xr.Dataset) -> Pag
         )
     stated = dict(content.get("environment") or {})
     if stated.get(CODE) != environment()[CODE] or "details" not in content:
-        return PageSeen(unproved=f"{HTML}: {_VIEW}: another version of this program wrote it")
+        return PageSeen(unproved=f"{HTML}: {_VIEW}: {_other_program(stated)}")
     there = read_text(folder / HTML, errors="replace")
     again = _made_anew(folder, content, data)
     if there == again:
@@ -55,6 +55,18 @@ def look_at_page(folder: Path, content: dict[str, Any], data: xr.Dataset) -> Pag
     place = next(apart, min(len(there), len(again)))
     shown = " ".join(there[max(place - 20, 0) : place + 40].split())
     return PageSeen(f"{HTML}: it is not the page that comes out of {JSON}; first at {shown!r}")
+
+
+def _other_program(stated: Mapping[str, str]) -> str:
+    """Say which program wrote a page, and why it is not the page that comes out here."""
+    wrote, here = (_program(one) for one in (stated, environment()))
+    return f"{wrote} wrote it, and {here} has other code, whose words and pictures may differ"
+
+
+def _program(stated: Mapping[str, str]) -> str:
+    version, commit = (str(stated.get(key, "")) for key in ("gfor-cosim", "Commit"))
+    at = f" at commit {commit[:8]}" if re.match(r"[0-9a-f]{40}", commit) else ""
+    return f"gfor-cosim {version}{at}" if version else "a version that it does not name"
 
 
 def views_beside(content: Mapping[str, Any]) -> list[str]:
