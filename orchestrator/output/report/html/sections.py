@@ -201,7 +201,7 @@ def modes(results: Results, figures: Figures) -> str:
         scenario_legend(results, reference.title if reference and compared else "")
         + complex_plane("Eigenvalue map", _marks(results), highest_hz=_highest(results)),
         "Modes from 0.1 Hz up with rays of equal damping; modes with a name are large"
-        + (f", circles are the figures of: {reference.title}." if reference and compared else "."),
+        + (f"; circles: {reference.title}." if reference and compared else "."),
     )
     parts.append(f"<p>{link} shows all modes; the pointer on one shows what it is.</p>{picture}")
     return "".join(parts) + _participation(results, figures)
