@@ -17,21 +17,32 @@ def fall_of_error(x: Figures) -> str:
     return f"the error falls from {x['error']:.3g} to {x['left']:.3g} pu (rms)"
 
 
+def _channel(given: str) -> str:
+    return Option.CHANNEL + f" '{given}'"
+
+
+def _frequency(hertz: float) -> str:
+    return Option.SET + f" f_n={hertz:g}"
+
+
 def _voltage_level(x: Figures) -> str:
     cause = f"{x['cause']}? Then give" if x["cause"] else "is the rated voltage right? Else give"
-    return f"before the event the voltage is {x['v']:.4g} pu: {cause} --channel '{x['remedy']}'"
+    return f"before the event the voltage is {x['v']:.4g} pu: {cause} " + _channel(x["remedy"])
 
 
 def _rating(x: Figures) -> str:
     if x["remedy"]:
-        given = " ".join(Option.CHANNEL + f" '{one}'" for one in x["remedy"])
+        given = " ".join(map(_channel, x["remedy"]))
         return (
             f"before the event the plant feeds {x['s']:.4g} pu of its rating of {x['rating']:g} MVA: are P and Q in kW "
             f"and kvar? Then give {given}"
         )
     return (
         f"before the event the plant feeds {x['s']:.3g} pu of its rating of {x['rating']:g} MVA: is the rating that of "
-        "the whole plant? Give it with --set S_n=…, or the power's unit with --channel"
+        "the whole plant? Give it with "
+        + Option.SET
+        + " S_n=…, or the power's unit with "
+        + Option.CHANNEL
     )
 
 
@@ -40,23 +51,25 @@ def _rated_frequency(x: Figures) -> str:
         frames = f"{_usual_frames(x, x['seen'])}, and " if "frames" in x else ""
         return (
             f"is the rated frequency {x['seen']:g} Hz? The device has {x['rated']:g} Hz; {frames}with the other one "
-            f"{fall_of_error(x)}. If it is so, give --set f_n={x['seen']:g}; if not, a droop of the model is wrong"
+            f"{fall_of_error(x)}. If it is so, give "
+            + _frequency(x["seen"])
+            + "; if not, a droop of the model is wrong"
         )
     if x.get("said"):
         return (
             f"the recording says that its line has {x['seen']:g} Hz, and the device's is {x['rated']:g} Hz: give its "
-            f"rated frequency, as in --set f_n={x['seen']:g}, or another recording"
+            "rated frequency, as in " + _frequency(x["seen"]) + ", or another recording"
         )
     return (
         f"before the event the frequency is {x['seen']:.4g} Hz, and the device's is {x['rated']:g} Hz: give its rated "
-        "frequency, as in --set f_n=60, or the channel's unit"
+        "frequency, as in " + _frequency(60) + ", or the channel's unit"
     )
 
 
 def _frames(x: Figures) -> str:
     return (
         f"{_usual_frames(x, x['grid'])}, and the device has {x['rated']:g} Hz: if it is of the other grid, give "
-        f"--set f_n={x['grid']:g}"
+        + _frequency(x["grid"])
     )
 
 
@@ -67,7 +80,7 @@ def _usual_frames(x: Figures, hertz: float) -> str:
 def _angle_unit(x: Figures) -> str:
     return (
         f"the angle jumps by {x['jump']:.4g} from one sample to the next, or begins beyond a turn: it looks like "
-        f"{x['unit']}. Give --channel '{x['remedy']}' if it is"
+        f"{x['unit']}. Give " + _channel(x["remedy"]) + " if it is"
     )
 
 
@@ -81,7 +94,7 @@ def _angle_held(x: Figures) -> str:
 def _angle_and_frequency(x: Figures) -> str:
     return (
         f"the angle turns {x['factor']:.4g} times as fast as the recording's frequency says: unit or sign of one is "
-        f"wrong. If it is the angle's, give --channel '{x['remedy']}'"
+        "wrong. If it is the angle's, give " + _channel(x["remedy"])
     )
 
 
@@ -94,7 +107,7 @@ def _frequency_alone(x: Figures) -> str:
 
 def _phase_order(x: Figures) -> str:
     what = "voltages" if x["what"] == "v" else "currents"
-    given = " ".join(f"--channel '{one}'" for one in x["remedy"])
+    given = " ".join(map(_channel, x["remedy"]))
     return f"the phases of the {what} follow each other as a, c, b: are two of them exchanged? If so, give {given}"
 
 
@@ -102,7 +115,8 @@ def _time_unit(x: Figures) -> str:
     return (
         f"the times look like {_TIMES[x['unit']]}: a sample every {x['interval']:.3g} s, {x['length']:.4g} s in all"
         + (f"; read so, {fall_of_error(x)}" if "left" in x else "")
-        + f". If they are, give --channel '{x['remedy']}'"
+        + ". If they are, give "
+        + _channel(x["remedy"])
     )
 
 
@@ -155,7 +169,8 @@ def _gap_at_event(x: Figures) -> str:
 def _lost_jump(x: Figures) -> str:
     return (
         f"the angle lacks up to {x['jump']:.3g} deg {_smoothed(x)}: was the angle integrated from a filtered "
-        "frequency, or filtered by itself? Give the angle as it was measured, with --channel 'angle=COLUMN'"
+        "frequency, or filtered by itself? Give the angle as it was measured, with "
+        + _channel("angle=COLUMN")
     )
 
 
@@ -203,7 +218,7 @@ def _lagged(x: Figures) -> str:
 
 
 def _read_otherwise(x: Figures) -> str:
-    given = " ".join(Option.CHANNEL + f" '{one}'" for one in x["remedy"])
+    given = " ".join(map(_channel, x["remedy"]))
     return f"{x['reading']}? Read so, {fall_of_error(x)}. If it is so, give {given}"
 
 
@@ -220,8 +235,8 @@ def _power_held(x: Figures) -> str:
     return (
         f"{x['column']!r} stands still to the last digit {x['count']} times while it moves, for {x['usual']:.3g} s and "
         f"up to {x['longest']:.3g} s, and jumps in between: is it stored only every so often, or only where it has "
-        f"changed by enough? The errors count that as the model's. Give the measured samples, as in --channel "
-        f"'{x['role']}=COLUMN'"
+        "changed by enough? The errors count that as the model's. Give the measured samples, as in "
+        + _channel(f"{x['role']}=COLUMN")
     )
 
 
