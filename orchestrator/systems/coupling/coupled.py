@@ -1,10 +1,11 @@
 """FMUs brought to life, connected, and initialised together."""
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,8 @@ from orchestrator.systems.coupling.imperfect_wires import Wires
 from orchestrator.systems.coupling.schedule import Schedule
 from orchestrator.systems.coupling.system import ComponentPlan, System
 from orchestrator.systems.coupling.turns import Exchange
+
+_Item = TypeVar("_Item")
 
 _INITIAL_PASSES = 20
 # of 1 or of an output: by how much it may change as initialisation ends, with the inputs as they
@@ -113,17 +116,19 @@ class CoupledComponents(Closing):
         self._initialise()
 
     def _connect(self) -> dict[str, Exchange]:
+        position = {name: k for k, name in enumerate(self.components)}
         sources = list(dict.fromkeys(c.source for c in self.system.connections))
-        sources.sort(key=lambda s: list(self.components).index(s.component))
+        sources.sort(key=lambda s: position[s.component])
         self.output_names = tuple(str(s) for s in sources)
         self._values = np.zeros(len(sources) + len(self.system.wires))
         self.y = self._values[: len(sources)]
         place = {source: i for i, source in enumerate(sources)}
         self.wires = Wires(self.system, self.schedule, self.clock.step_size, place, self._values)
+        owned = _grouped(enumerate(sources), lambda numbered: numbered[1].component)
+        fed = _grouped(self.system.connections, lambda c: c.target.component)
         exchanges = {}
         for name, component in self.components.items():
-            own = [i for i, s in enumerate(sources) if s.component == name]
-            feeding = [c for c in self.system.connections if c.target.component == name]
+            own, feeding = [i for i, _ in owned.get(name, ())], fed.get(name, [])
             inputs = [c.target.variable for c in feeding]
             outputs = [sources[i].variable for i in own]
             window = slice(own[0], own[-1] + 1) if own else slice(0)
@@ -222,6 +227,16 @@ class CoupledComponents(Closing):
         self.exchanges[name].outputs.read()
 
 
+def _grouped(
+    items: Iterable[_Item], component_of: Callable[[_Item], str]
+) -> dict[str, list[_Item]]:
+    """The items of each component, in their order."""
+    groups: dict[str, list[_Item]] = {}
+    for item in items:
+        groups.setdefault(component_of(item), []).append(item)
+    return groups
+
+
 def _begin(component: Component, plan: ComponentPlan, stop_time: float | None) -> None:
     """Set a new component up; some FMUs forget the parameters that they were given before that."""
     component.setup(0.0, stop_time)
@@ -247,7 +262,7 @@ def _check_taken(name: str, component: Component, plan: ComponentPlan) -> None:
     except ComponentError:
         return  # what cannot be read cannot be judged
     for parameter, given in plan.parameters.items():
-        if not np.isclose(values[parameter], given, rtol=_SAME, atol=0.0):
+        if not math.isclose(values[parameter], given, rel_tol=_SAME):
             raise ComponentError(
                 name,
                 "fmi2SetReal",
