@@ -72,30 +72,34 @@ class _Part:
 class DividedHub:
     """R and T of a hub's equations, in parts; they do not depend on σ.
 
-    ``hub``, ``entered``: order of the hub's equations, and of R's columns, in the parts.
+    ``hub``: order of the hub's equations in the parts.
+    ``entered``: what the parts take of the entered places, sparse, shape (columns of all parts, entered places).
     ``at_rest``: by equation in that order, whether σ stands in it."""
 
     hub: Places
-    entered: Places
+    entered: sp.csr_array
     at_rest: NDArray[np.bool_]
     whole: _Part = field(repr=False)
 
     def taken_in(self, x: Vector) -> Vector:
         """R·x, for the entered places' x, shape (k, c)."""
         found = np.zeros((len(self.hub), x.shape[1]), dtype=x.dtype)
-        _take_in(self.whole, _numbers(x[self.entered]), _numbers(found))
+        _take_in(self.whole, _numbers(times(self.entered, x)), _numbers(found))
         return _put_back(found, self.hub)
 
     def given_out(self, y: Vector) -> Vector:
         """Rᵀ·y at the entered places, for y of shape (h, c)."""
-        found = np.zeros((len(self.entered), y.shape[1]), dtype=y.dtype)
+        found = np.zeros((self.entered.shape[0], y.shape[1]), dtype=y.dtype)
         _give_out(self.whole, _numbers(y[self.hub]), _numbers(found))
-        return _put_back(found, self.entered)
+        return times(self.entered.T, found)
 
     def at(self, sigma: complex, inside: sp.csc_array) -> "DividedFactors":
         """Factorise T − σ − R·inside; ``inside`` has the entered places as rows, and the hub's equations as columns."""
-        ordered = sp.csr_array(inside[self.entered][:, self.hub])
-        return DividedFactors(self, _factors(self.whole, sigma * self.at_rest, ordered))
+        ordered = sp.csr_array((self.entered @ inside)[:, self.hub])
+        root, _ = _factors(
+            self.whole, sigma * self.at_rest, ordered, np.zeros((len(self.hub), 0), dtype=complex)
+        )
+        return DividedFactors(self, root)
 
 
 @dataclass(frozen=True)
@@ -118,15 +122,15 @@ class DividedFactors:
 
 @dataclass(frozen=True)
 class _Whole:
-    """Factors of a part that is kept whole."""
+    """A part that is kept whole, inverted: a product with few vectors is faster than two triangular solutions."""
 
-    lu: tuple[Matrix, Places]
+    inverse: Vector
 
     def solve(self, right: Vector) -> Vector:
-        return through_lu(self.lu, right)
+        return np.asarray(self.inverse @ right)
 
     def solve_adjoint(self, right: Vector) -> Vector:
-        return through_lu(self.lu, right, adjoint=True)
+        return _adjoint_times(self.inverse, right)
 
 
 @dataclass(frozen=True)
@@ -135,15 +139,17 @@ class _Tied:
 
     halves: "tuple[_Whole | _Tied, _Whole | _Tied]"
     cut: int  # equations of the first half
-    X: tuple[Matrix, Matrix]
-    V: tuple[Matrix, Matrix]  # transposed; V₁ᵀ takes what is of the second half
-    lu: tuple[Matrix, Places]
+    X: tuple[Vector, Vector]
+    V: tuple[Vector, Vector]  # transposed; V₁ᵀ takes what is of the second half
+    across: Vector  # K⁻¹
 
     def solve(self, right: Vector) -> Vector:
         first, second = self.halves
-        one, other = first.solve(right[: self.cut]), second.solve(right[self.cut :])
-        through = np.concatenate([self.V[0] @ other, self.V[1] @ one])
-        through = through_lu(self.lu, through)
+        return self.beside(first.solve(right[: self.cut]), second.solve(right[self.cut :]))
+
+    def beside(self, one: Vector, other: Vector) -> Vector:
+        """Return the solution, given those of both halves alone."""
+        through = self.across @ np.concatenate([self.V[0] @ other, self.V[1] @ one])
         ties = len(self.V[0])
         return np.concatenate(
             [one - self.X[0] @ through[:ties], other - self.X[1] @ through[ties:]]
@@ -152,38 +158,52 @@ class _Tied:
     def solve_adjoint(self, right: Vector) -> Vector:
         first, second = self.halves
         one, other = right[: self.cut], right[self.cut :]
-        through = np.concatenate([self.X[0].conj().T @ one, self.X[1].conj().T @ other])
-        through = through_lu(self.lu, through, adjoint=True)
+        through = np.concatenate([_adjoint_times(self.X[0], one), _adjoint_times(self.X[1], other)])
+        through = _adjoint_times(self.across, through)
         ties = len(self.V[0])
         return np.concatenate(
             [
-                first.solve_adjoint(one - self.V[1].conj().T @ through[ties:]),
-                second.solve_adjoint(other - self.V[0].conj().T @ through[:ties]),
+                first.solve_adjoint(one - _adjoint_times(self.V[1], through[ties:])),
+                second.solve_adjoint(other - _adjoint_times(self.V[0], through[:ties])),
             ]
         )
 
 
-def _factors(part: _Part, shift: Vector, inside: sp.csr_array) -> "_Whole | _Tied":
+def _adjoint_times(matrix: Vector, right: Vector) -> Vector:
+    """Aᴴ·b, without a copy of A."""
+    return np.asarray((matrix.T @ right.conj()).conj())
+
+
+def _factors(
+    part: _Part, shift: Vector, inside: sp.csr_array, right: Vector
+) -> "tuple[_Whole | _Tied, Vector]":
+    """Return a part's factors and the solution of some right sides, shape (equations of the part, c).
+
+    The ties of all larger parts are right sides of a smaller one, which is gone through once for all of them."""
     if part.halves is None or part.ties is None:
         assert part.among is not None
         assert part.taken is not None
         schur = part.among - _dense_times(part.taken, _within(inside, part))
         schur[np.diag_indices_from(schur)] -= shift[part.hub]
-        return _Whole(scipy.linalg.lu_factor(schur, overwrite_a=True, check_finite=False))
-    halves = part.halves
-    first, second = (_factors(half, shift, inside) for half in halves)
+        whole = _Whole(np.linalg.inv(schur))
+        return whole, whole.solve(right)
+    halves, ties = part.halves, part.ties
+    cut = halves[0].hub.stop - halves[0].hub.start
+    (first, one), (second, other) = (
+        _factors(half, shift, inside, np.hstack([tie.left, own]))
+        for half, tie, own in zip(halves, ties, (right[:cut], right[cut:]), strict=True)
+    )
     V = [
-        tie.hub - _dense_times(tie.entered, _within(inside, other))
-        for tie, other in zip(part.ties, reversed(halves), strict=True)
+        tie.hub - _dense_times(tie.entered, _within(inside, half))
+        for tie, half in zip(ties, reversed(halves), strict=True)
     ]
-    X = first.solve(part.ties[0].left + 0j), second.solve(part.ties[1].left + 0j)
-    ties = len(V[0])
-    among = np.eye(ties + len(V[1]), dtype=complex)
-    among[:ties, ties:] = V[0] @ X[1]
-    among[ties:, :ties] = V[1] @ X[0]
-    lu = scipy.linalg.lu_factor(among, overwrite_a=True, check_finite=False)
-    cut = part.halves[0].hub.stop - part.hub.start
-    return _Tied((first, second), cut, X, (V[0], V[1]), lu)
+    begin, end = len(V[0]), len(V[1])
+    X = np.ascontiguousarray(one[:, :begin]), np.ascontiguousarray(other[:, :end])
+    among = np.eye(begin + end, dtype=complex)
+    among[:begin, begin:] = V[0] @ X[1]
+    among[begin:, :begin] = V[1] @ X[0]
+    tied = _Tied((first, second), cut, X, (V[0], V[1]), np.linalg.inv(among))
+    return tied, tied.beside(one[:, begin:], other[:, end:])
 
 
 def _within(inside: sp.csr_array, part: _Part) -> sp.csr_array:
@@ -276,6 +296,12 @@ def divide(
     owner, taker
         Group of each of the hub's unknowns and of each entered place; what is of one group is not parted.
     """
+    own = T.diagonal().copy()
+    np.fill_diagonal(T, 0.0)
+    scale = np.sqrt(sum(np.einsum("ij,ij->i", matrix, matrix) for matrix in (T, R)))
+    np.fill_diagonal(T, own)
+    scale = np.where(scale > 0, scale, 1.0)
+    R, in_common, taker = _in_common(R, scale, taker)
     sizes = np.bincount(owner)
     leaves = _leaves(_nearness(T, R, owner, taker), sizes)
     place = np.empty(len(sizes), dtype=np.int64)
@@ -284,15 +310,42 @@ def divide(
     cuts = np.cumsum([0, *map(len, leaves)])
     edges = [np.searchsorted(place[of][o], cuts) for of, o in ((owner, hub), (taker, entered))]
     T, R = _in_order(T, hub, hub), _in_order(R, hub, entered)
-    own = T.diagonal().copy()
-    np.fill_diagonal(T, 0.0)
-    scale = np.sqrt(sum(np.einsum("ij,ij->i", matrix, matrix) for matrix in (T, R)))
-    np.fill_diagonal(T, own)
-    builder = _Builder(T, R, np.where(scale > 0, scale, 1.0), edges)
+    builder = _Builder(T, R, scale[hub], edges)
     whole = builder.part(0, len(leaves))
     if whole.size > _WORTH * (T.size + R.size):
         return None
-    return DividedHub(hub, entered, at_rest[hub], whole)
+    return DividedHub(hub, in_common[entered], at_rest[hub], whole)
+
+
+def _in_common(R: Matrix, scale: Vector, taker: Places) -> tuple[Matrix, sp.csr_array, Places]:
+    """Return all that the hub takes of each group in as few columns as say it: R = L·C.
+
+    All currents of a bus move the hub as currents of that bus do, whatever device they come from.
+
+    Returns
+    -------
+    L of shape (h, c), C as sparse rows, shape (c, k), and the group of each column of L.
+    """
+    if not len(taker):
+        return R, sp.csr_array((0, 0)), taker
+    order = np.argsort(taker, kind="stable")
+    groups = np.split(order, np.flatnonzero(np.diff(taker[order])) + 1)
+    tried = max(map(len, groups)) + _SPARE
+    weights = np.random.default_rng(0).standard_normal((tried, len(R))) / np.sqrt(tried)
+    answers = weights / scale @ R
+    said = [_rows_of(answers[:, group], len(R)) for group in groups]
+    by_group = sp.block_diag(said, format="csr")
+    common = by_group[:, np.argsort(order)]
+    L = np.empty((len(R), common.shape[0]))
+    for begin in range(0, len(R), _ROWS):
+        L[begin : begin + _ROWS] = (common @ R[begin : begin + _ROWS].T).T
+    return L, common, np.repeat(taker[[group[0] for group in groups]], list(map(len, said)))
+
+
+def _rows_of(answers: Matrix, rows: int) -> Matrix:
+    """Directions, as rows, in which some columns answer; the others are as small as ties that are left out."""
+    _, sizes, right = np.linalg.svd(answers, full_matrices=False)
+    return np.asarray(right[sizes > _NEGLIGIBLE * np.sqrt(rows)])
 
 
 def _in_order(matrix: Matrix, rows: Places, columns: Places) -> Matrix:

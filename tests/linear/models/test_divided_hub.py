@@ -122,6 +122,24 @@ def test_ties_of_weight_that_are_left_out_are_noticed(monkeypatch):
     assert np.allclose(model.A @ factors.solve(b) - SIGMA * factors.solve(b), b, atol=1e-9)
 
 
+def test_currents_of_one_bus_are_taken_together_and_what_no_other_says_is_kept():
+    """Three buses with four, four and one current; two of the first four move the hub as the others do."""
+    rng = np.random.default_rng(3)
+    taker = np.array([0, 1, 0, 2, 1, 0, 1, 0, 1])
+    R = rng.standard_normal((60, 9))
+    R[:, 5] = 2 * R[:, 0]
+    R[:, 7] = R[:, 0] - R[:, 2]
+    L, common, owner = divided_hub._in_common(R, np.ones(60), taker)
+    assert np.bincount(owner).tolist() == [2, 4, 1]
+    assert np.abs(L @ common - R).max() < 1e-13
+    noisy = R + 1e-12 * rng.standard_normal(R.shape)
+    assert divided_hub._in_common(noisy, np.ones(60), taker)[1].shape == (7, 9)
+    R[3, 7] += 1e-6  # far above what is left out
+    L, common, _ = divided_hub._in_common(R, np.ones(60), taker)
+    assert common.shape == (8, 9)
+    assert np.abs(L @ common - R).max() < 1e-13
+
+
 def searches(monkeypatch):
     """Collect what is searched in blocks."""
     begun = []
@@ -153,6 +171,25 @@ def test_few_left_vectors_come_from_beside_their_eigenvalues_without_a_second_se
     monkeypatch.setattr(left_vectors, "MOST_POINTS", 1)
     assert_left(model, search.pairs(few))
     assert len(begun) == 2
+
+
+def test_a_point_next_to_an_eigenvalue_needs_few_solutions():
+    model = along_a_line()
+    search = Search(model, 2j * np.pi * 0.75)
+    values = search.reaching(0.6)
+    assert values is not None
+    solutions = []
+    solver_beside = LinearModel.solver_beside
+
+    def counted(self, sigma):
+        solve = solver_beside(self, sigma)
+        return lambda b: solutions.append(sigma) or solve(b)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(LinearModel, "solver_beside", counted)
+        nearest = int(np.argmin(np.abs(values - search.centre)))
+        assert_left(model, search.pairs([nearest]))
+    assert 2 <= len(solutions) <= 4
 
 
 @pytest.mark.parametrize("wrong", ["random", "others"])
