@@ -14,6 +14,7 @@ from orchestrator.linear.spectra import critical_modes
 from orchestrator.linear.spectra.block_arnoldi import WIDTHS, BlockArnoldi
 from orchestrator.linear.spectra.critical_modes import Search, find_critical_modes
 from orchestrator.linear.spectra.modes import find_modes
+from orchestrator.linear.spectra.sketch import sketch
 from tests.linear.models.test_hub_elimination import UNSTABLE, system
 
 SIZE = 260
@@ -48,6 +49,61 @@ def test_vectors_stay_orthogonal_where_little_of_them_is_new():
     assert search.grow()
     known = search._basis[:, : search._done + search.width]
     assert abs(known.conj().T @ known - np.eye(known.shape[1])).max() < 1e-13
+
+
+LONG, MOST_VECTORS = 3_000, 96
+"""A vector's elements and a search's vectors, of which short images are taken."""
+
+
+def searched(operator, **options):
+    """A search that has taken all its vectors."""
+    search = BlockArnoldi(operator, LONG, MOST_VECTORS, **options)
+    while search.grow():
+        pass
+    assert search._images.shape[0] < LONG / 5
+    return search
+
+
+def assert_written_in_the_basis(search, operator):
+    """A·V = V·H to the last digits, and no vector hides among the others."""
+    done = search.count
+    known = search._basis[:, : done + search.width]
+    image = known @ search._image[: done + search.width, :done]
+    assert np.abs(operator(known[:, :done]) - image).max() < 1e-13
+    assert np.linalg.cond(known) < 4
+
+
+def test_vectors_orthogonal_in_their_images_give_the_same_eigenvalues():
+    values = 1 / np.concatenate([np.array([1 + 2j, 1 - 2j, 3, 3.001]), np.linspace(30, 900, 2_996)])
+
+    def operator(x):
+        return values[:, None] * x
+
+    search = searched(operator)
+    assert_written_in_the_basis(search, operator)
+    assert np.abs(search.values[:4, None] - values[:4]).min(axis=0).max() < 1e-13
+    assert (search.accuracy[:4] < 1e-10).all()
+
+
+def test_an_operator_that_turns_little_out_of_a_few_directions_leaves_the_basis_whole():
+    turns = np.random.default_rng(2).standard_normal((2, LONG, 6)) / np.sqrt(LONG)
+
+    def operator(x):
+        return turns[0] @ (turns[1].T @ x)
+
+    search = searched(operator)
+    assert_written_in_the_basis(search, operator)
+    wanted = np.linalg.eigvals(turns[1].T @ turns[0])
+    assert np.abs(search.values[:6, None] - wanted).min(axis=0).max() < 1e-12
+
+
+def test_short_images_keep_the_lengths_of_what_lies_in_one_place_and_of_what_lies_everywhere():
+    rng = np.random.default_rng(5)
+    in_one_place = np.eye(LONG)[:, rng.choice(LONG, 40, replace=False)]
+    whole = np.linalg.qr(np.hstack([in_one_place, rng.standard_normal((LONG, 40))]))[0]
+    lengths = np.linalg.svd(sketch(LONG, 400) @ whole, compute_uv=False)
+    assert 0.45 < lengths.min() < lengths.max() < 1.55
+    assert (sketch(30, 40).toarray() == np.eye(30)).all()
 
 
 def one_by_one(found, wanted):
