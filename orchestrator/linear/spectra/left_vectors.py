@@ -20,12 +20,13 @@ _TOGETHER = 0.1
 """Eigenvalues nearer to each other than this part of their distance from the point of the search share a point, and
 their vectors are found as one space."""
 
-_BESIDE = 1e-2
-"""Distance of a point from its eigenvalues, as a part of the same: a solution close to an eigenvalue loses digits."""
+_BESIDE = 1e-5
+"""Distance of a point from its eigenvalues, as a part of theirs from the point of the search. Each solution leaves of
+other vectors as much as this distance is of theirs; what it loses in digits so close lies along the vector itself."""
 
 _SOLUTIONS = 12  # from one point, at most
 
-_SETTLED = 1e-9  # part of the vectors by which the last solution may have moved their space
+_SETTLED = 1e-7  # part of the vectors by which the last solution may have moved their space
 
 
 def left_vectors(model: LinearModel, sigma: complex, nu: NDArray[np.complex128]) -> Vector | None:
