@@ -3,6 +3,8 @@
 What is kept of an output is what a reader of the page sees: text without colours, tables, pictures with few colours.
 """
 
+from __future__ import annotations
+
 import base64
 import io
 import os
@@ -12,13 +14,16 @@ import sys
 import sysconfig
 from pathlib import Path
 from tempfile import TemporaryDirectory
-
-import nbformat
-from nbclient import NotebookClient
-from nbformat import NotebookNode
-from PIL import Image
+from typing import TYPE_CHECKING
 
 from tests.pages.markdown import ROOT
+from tests.support.late import LateLibrary
+
+if TYPE_CHECKING:
+    from nbformat import NotebookNode
+
+nbclient, nbformat = LateLibrary("nbclient"), LateLibrary("nbformat")
+pictures = LateLibrary("PIL.Image")
 
 NOTEBOOKS = sorted((ROOT / ".docs" / "tutorials").glob("*.ipynb"))
 SECONDS = 1800
@@ -45,7 +50,7 @@ def execute(path: Path, folder: Path, more: str = "") -> NotebookNode:
     notebook = nbformat.read(path, as_version=4)
     if more:
         notebook.cells.append(nbformat.v4.new_code_cell(more))
-    client = NotebookClient(
+    client = nbclient.NotebookClient(
         notebook, timeout=SECONDS, record_timing=False, resources={"metadata": {"path": folder}}
     )
     client.execute(env=_environment(folder))
@@ -99,7 +104,7 @@ def _tidy(output: NotebookNode) -> NotebookNode:
 
 def _small(png: str) -> str:
     """A picture with 64 colours, in base64."""
-    picture = Image.open(io.BytesIO(base64.b64decode(png))).convert("RGB").quantize(64)
+    picture = pictures.open(io.BytesIO(base64.b64decode(png))).convert("RGB").quantize(64)
     written = io.BytesIO()
     picture.save(written, "png", optimize=True)
     return base64.b64encode(written.getvalue()).decode("ascii")

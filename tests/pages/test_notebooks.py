@@ -2,11 +2,10 @@
 
 import re
 
-import nbformat
 import pytest
 
 from tests.pages.markdown import ROOT, name_of
-from tests.pages.notebooks import NOTEBOOKS, execute, shown_text
+from tests.pages.notebooks import NOTEBOOKS, execute, nbformat, shown_text
 
 MODE = 'named["electromechanical"]'
 CLAIMS = {

@@ -8,8 +8,6 @@ from xml.etree import ElementTree
 
 import fmpy
 import pytest
-import wasmtime
-from wasmtime import component as components
 
 import orchestrator as gfor
 from fmus.toolchain.catalogue import build_model
@@ -20,7 +18,10 @@ from fmus.toolchain.native_fmu import NativeFmu
 from orchestrator.core.errors import InputError
 from orchestrator.devices.fmi.description import read_declared
 from tests.support.host import H
+from tests.support.late import LateLibrary
 from tests.toolchain.test_native_fmi3 import Host3
+
+wasmtime, components = LateLibrary("wasmtime"), LateLibrary("wasmtime.component")
 
 CALLS = "fmi:fmi3/co-simulation@3.0.0"
 STEPS, JUMP_AT, JUMP = 2000, 500, math.radians(-10.0)

@@ -15,15 +15,16 @@ from orchestrator.cases.flow.power_flow import FlowUnit, explain, solve_power_fl
 from orchestrator.cases.networks import conversion as network_import
 from orchestrator.cases.networks.sources import _pandapower_tables
 from orchestrator.core.errors import InputError
+from tests.support.late import LateLibrary
 
-pandapower = pytest.importorskip("pandapower")
+pandapower, networks = LateLibrary("pandapower"), LateLibrary("pandapower.networks")
 pytestmark = pytest.mark.filterwarnings("ignore:tap_dependency_table:DeprecationWarning")
 SMALL = ["case9", "case14", "case39", "case57", "case118"]
 
 
 def of_pandapower(name, **options):
     """A network solved by pandapower: its elements in our form, and its voltages by bus."""
-    net = getattr(pandapower.networks, name)()
+    net = getattr(networks, name)()
     pandapower.runpp(
         net,
         calculate_voltage_angles=True,
@@ -78,7 +79,7 @@ def test_voltages_are_pandapowers(name):
 def test_flows_and_losses_are_pandapowers(name):
     elements, _ = of_pandapower(name)
     flow = solve_power_flow(*elements)
-    net = getattr(pandapower.networks, name)()
+    net = getattr(networks, name)()
     pandapower.runpp(net, numba=False, tolerance_mva=1e-9, voltage_depend_loads=False)
     ours = [
         line.powers(flow.voltages[line.from_bus], flow.voltages[line.to_bus]) for line in flow.lines

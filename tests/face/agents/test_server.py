@@ -4,11 +4,12 @@ import sys
 
 import anyio
 import pytest
-from mcp import Client, StdioServerParameters
-from mcp.client.stdio import stdio_client
 
 import orchestrator as gfor
 from orchestrator.face.agents.server import VERBS as IN_ORDER
+from tests.support.late import LateLibrary
+
+mcp, streams = LateLibrary("mcp"), LateLibrary("mcp.client.stdio")
 
 VERBS = {
     "cases",
@@ -26,11 +27,11 @@ def ask(folder, *questions):
     """Return the server's tools, and its result for each question (verb, arguments)."""
 
     async def talk():
-        server = StdioServerParameters(
+        server = mcp.StdioServerParameters(
             command=sys.executable,
             args=["-m", "orchestrator.face.cli", "mcp", "--root", str(folder)],
         )
-        async with Client(stdio_client(server)) as client:
+        async with mcp.Client(streams.stdio_client(server)) as client:
             tools = (await client.list_tools()).tools
             return tools, [await client.call_tool(verb, given) for verb, given in questions]
 

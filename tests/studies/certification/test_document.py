@@ -7,7 +7,6 @@ from html import escape
 from types import SimpleNamespace
 
 import numpy as np
-import pypdf
 import pytest
 
 from orchestrator.core.errors import CaseError, InputError
@@ -23,6 +22,9 @@ from orchestrator.studies.certification.judgement import judge
 from orchestrator.studies.certification.point import POWER, PointResult
 from orchestrator.studies.certification.report_criteria import converter_model
 from tests.studies.certification.fabricated import rings
+from tests.support.late import LateLibrary
+
+pypdf = LateLibrary("pypdf")
 
 DETAILS = 'number = "7/2026"\napplicant = "Acme <Power>"\noperator = ""\ntester = "Lab 3"\ndate = 2026-11-22\n'
 
