@@ -8,11 +8,11 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
-from importlib.metadata import version
 from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from fmus.toolchain.extras import installed_version
 from fmus.toolchain.removal import remove_tree
 from orchestrator.core.errors import (
     BindingError,
@@ -118,7 +118,7 @@ class AcceptanceReport:
     def as_dict(self) -> dict[str, Any]:
         checks = [{"question": question_of(r.check), **r.as_dict()} for r in self.results]
         return {
-            "tool": f"gfor-cosim {version('gfor-cosim')}",
+            "tool": f"gfor-cosim {installed_version('gfor-cosim')}",
             "fmu": str(self.fmu),
             "binding": None if self.binding is None else str(self.binding),
             "sha256": {"fmu": file_hash(self.fmu), "binding": file_hash(self.binding)},

@@ -8,14 +8,13 @@ import csv
 import io
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fmus.toolchain.extras import installed_version
 from orchestrator.core.late import xr
 from orchestrator.core.safe_files import replacing, write_bytes, write_text
 from orchestrator.output.results.netcdf import netcdf_image, stored_name
@@ -85,11 +84,8 @@ def measuring_places(prepared: PreparedScenario) -> dict[str, str]:
 
 
 def versions_of(packages: Iterable[str]) -> dict[str, str]:
-    found = {}
-    for package in packages:
-        with suppress(PackageNotFoundError):
-            found[package] = version(package)
-    return found
+    """Versions of those that are installed."""
+    return {package: found for package in packages if (found := installed_version(package))}
 
 
 class Recorded(Protocol):

@@ -3,10 +3,10 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from fmus.toolchain.extras import installed_version
 from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option, command
 from orchestrator.core.safe_files import file_hash, write_text
@@ -111,4 +111,4 @@ def _unknown(reasons: Sequence[str]) -> tuple[str, ...]:
 
 
 def _tool() -> str:
-    return f"gfor-cosim {version('gfor-cosim')}"
+    return f"gfor-cosim {installed_version('gfor-cosim')}"

@@ -3,9 +3,9 @@
 import platform
 import subprocess
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 
+from fmus.toolchain.extras import installed_version
 from orchestrator.output.results.file_writers import versions_of
 from orchestrator.studies.points.code import code_hash
 
@@ -17,7 +17,7 @@ _ROOT = Path(__file__).parents[3]
 
 def environment() -> dict[str, str]:
     known = {
-        "gfor-cosim": version("gfor-cosim"),
+        "gfor-cosim": installed_version("gfor-cosim"),
         "Commit": commit(),
         CODE: code_hash(),
         "Operating system": platform.platform(),

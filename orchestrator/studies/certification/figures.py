@@ -3,12 +3,12 @@
 import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from fmus.toolchain.extras import installed_version
 from orchestrator.devices.fmi.archive import read_origin
 from orchestrator.devices.fmi.description import FmuDescription, VariableInfo
 from orchestrator.devices.fmi.port_mapping import START, BoundDescription, without_binding
@@ -105,7 +105,7 @@ def damping_json(c: DampingCertificate) -> dict[str, Any]:
     return {
         "format": NORM,
         "norm": c.code.source,
-        "tool": f"gfor-cosim {version('gfor-cosim')}",
+        "tool": f"gfor-cosim {installed_version('gfor-cosim')}",
         "verdict": c.verdict,
         "passed": c.passed,
         "sentence": c.sentence(),

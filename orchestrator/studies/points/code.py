@@ -7,7 +7,6 @@ import os
 from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib.machinery import SourceFileLoader
-from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 from types import CodeType
@@ -46,7 +45,9 @@ def _hash_of_files() -> str:
 
 
 def _of_versions() -> "hashlib._Hash":
-    return hashlib.sha256(f"{version('gfor-cosim')}\0{json.dumps(library_versions())}".encode())
+    return hashlib.sha256(
+        f"{installed_version('gfor-cosim')}\0{json.dumps(library_versions())}".encode()
+    )
 
 
 def code_files() -> list[Path]:

@@ -9,10 +9,10 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from functools import lru_cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from fmus.toolchain.extras import installed_version
 from orchestrator.cases.form.locate import place_in
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import few
@@ -37,7 +37,7 @@ def mark_of(prepared: PreparedScenario) -> dict[str, str]:
         else f", tolerance {prepared.schedule.tolerance:g}"
     )
     found = {
-        "gfor-cosim": version("gfor-cosim"),
+        "gfor-cosim": installed_version("gfor-cosim"),
         **library_versions(),
         "the code of gfor-cosim": code_hash(),
         "machine": f"{sys.platform} {platform.machine()}",

@@ -5,10 +5,10 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from html import escape
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from fmus.toolchain.extras import installed_version
 from orchestrator.cases.networks.element_names import ElementNames
 
 
@@ -122,7 +122,7 @@ def document(
         f'<section id="section-{k}"><h2>{escape(name)}</h2>{text}</section>'
         for k, (name, text) in enumerate(content)
     )
-    made = f"gfor-cosim {version('gfor-cosim')}, {moment or datetime.now(UTC):%Y-%m-%d %H:%M} UTC"
+    made = f"gfor-cosim {installed_version('gfor-cosim')}, {moment or datetime.now(UTC):%Y-%m-%d %H:%M} UTC"
     return f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{escape(title)}</title><link rel="icon" href="data:,"><style>{_text("page.css")}{_footer(title)}</style></head>
