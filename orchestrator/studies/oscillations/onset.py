@@ -47,16 +47,16 @@ def onset_of(times: Numbers, envelope: Numbers, half: int, frequency: float) -> 
     step = float(times[1] - times[0])
     stride = max(1, round(1 / (_STEPS * frequency * step)))
     z = envelope[::stride]
-    at = np.arange(len(z)) * stride
     begins = np.arange(0, len(envelope) + 2 * half - stride, stride)  # samples of the record
     window = np.hanning(2 * half + 3)[1:-1]
     window = window / window.sum()
+    moves = np.arange(1 - len(begins), len(z)) * stride  # of a window behind a begin
     left = np.full(len(begins), np.inf)
-    steady = _shifted(np.ones(len(times)), window, at, begins)
+    steady = _seen(np.ones(len(times)), window, moves)
     for sigma in _DECAYS:
         for delta in _APART * 2 * np.pi * frequency:
             dying = np.exp((-sigma + 1j * delta) * step * np.arange(len(times)))
-            left = np.minimum(left, _left_over(z, steady, _shifted(dying, window, at, begins)))
+            left = np.minimum(left, _left_over(z, steady, _seen(dying, window, moves)))
     best = int(np.argmin(left))
     samples = len(envelope) / (_INDEPENDENT * len(window))
     good = np.flatnonzero(left <= left[best] * (1 + _MORE / samples))
@@ -67,23 +67,31 @@ def onset_of(times: Numbers, envelope: Numbers, half: int, frequency: float) -> 
     )
 
 
-def _shifted(law: Numbers, window: Numbers, at: Places, begins: Places) -> Numbers:
-    """A law that starts at each begin, as the window sees it, shape (begins, samples)."""
+def _seen(law: Numbers, window: Numbers, moves: Places) -> Numbers:
+    """A law as the window sees it that stands so many samples behind the law's begin, shape (moves,)."""
     length = len(window)
     # seen[k]: the window's first sample stands k − length behind the begin
     seen = np.convolve(np.concatenate([np.zeros(length), law]), window, mode="valid")
-    places = at[None, :] - begins[:, None] + length
-    return np.where(places >= 0, seen[np.clip(places, 0, len(seen) - 1)], 0.0)
+    return np.where(moves >= -length, seen[np.maximum(moves + length, 0)], 0.0)
 
 
 def _left_over(z: Numbers, one: Numbers, other: Numbers) -> Numbers:
-    """Squares that two laws leave over, shape (begins,)."""
-    p, q = (np.einsum("ij,ij->i", law.conj(), law).real for law in (one, other))
-    r = np.einsum("ij,ij->i", one.conj(), other)
-    x, y = (law.conj() @ z for law in (one, other))
+    """Squares that two laws leave over of ``z``, shape (begins,), the first begin first.
+
+    A later begin moves a law along the samples, so that all products are those of one row: running sums and a
+    correlation."""
+    p, q = (_running(np.abs(law) ** 2, len(z)) for law in (one, other))
+    r = _running(one.conj() * other, len(z))
+    x, y = (np.correlate(law, z, mode="valid")[::-1].conj() for law in (one, other))
     determinant = p * q - np.abs(r) ** 2
     alone = np.abs(x) ** 2 / np.maximum(p, 1e-12)
     both = (q * np.abs(x) ** 2 + p * np.abs(y) ** 2 - 2 * (x.conj() * r * y).real) / np.where(
         determinant > 1e-6 * p * q, determinant, np.inf
     )
     return np.asarray((np.abs(z) ** 2).sum() - np.maximum(alone, both))
+
+
+def _running(values: Numbers, length: int) -> Numbers:
+    """Sums of so many values in a row, the last row first."""
+    sums = np.concatenate([[0.0], np.cumsum(values)])
+    return np.asarray((sums[length:] - sums[:-length])[::-1])
