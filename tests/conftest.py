@@ -20,6 +20,7 @@ from fmus.toolchain.native_fmu import NativeFmu
 from fmus.toolchain.python_fmu import PythonFmu
 from orchestrator.core.spelling import as_options
 from orchestrator.face.cli import main
+from tests.support import once
 from tests.support.bytecode import TESTS, import_share, keep
 from tests.support.durations import MEASURED, Measure, longest_first, mark
 from tests.support.skips import Skips, in_ci
@@ -78,6 +79,11 @@ def spelt(request):
         else as_options()
     ):
         yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def shared(tmp_path_factory):
+    once.share_in(tmp_path_factory)
 
 
 @pytest.fixture(scope="session")

@@ -37,7 +37,7 @@ def site(tmp_path_factory):
         )
         assert done.returncode == 0, done.stdout + done.stderr
 
-    return made_once(tmp_path_factory, "site", build)
+    return made_once("site", build)
 
 
 def test_every_page_is_there(site):

@@ -1,7 +1,6 @@
 """The two-area study with phasor models at milliseconds, against the EMT models at 100 µs."""
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -16,6 +15,7 @@ from orchestrator.studies.runs.run import run_scenario
 from orchestrator.systems.coupling.schedule import jacobi
 from orchestrator.systems.coupling.step_awareness import other_step
 from tests.support.exact import exact_continuous
+from tests.support.once import computed_once
 
 pytestmark = pytest.mark.reproduction
 
@@ -29,13 +29,13 @@ def prepare(case, scenario, overrides=None, **arguments):
     return ready
 
 
-@cache
+@computed_once
 def emt_mode(scenario, X_L):
     """The electromechanical mode of the EMT FMUs at 100 µs."""
     return compute_modes(prepare("two_area", scenario, {"grid.X_L": X_L})).electromechanical
 
 
-@cache
+@computed_once
 def rms_mode(scenario, X_L=0.1, step_size=5e-3, overrides=()):
     values = {"grid.X_L": X_L} | dict(overrides)
     return compute_modes(

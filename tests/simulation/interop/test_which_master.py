@@ -19,12 +19,13 @@ from orchestrator.simulation.interop.rules import MASTERS
 from orchestrator.simulation.interop.which_master import PROPERTIES, identify
 from tests.simulation.interop import drivers
 from tests.simulation.interop.jobs import job_of, write_ssp
+from tests.support.once import computed_once
 
 H, N = 0.1, 20
 HEADS = ["time", *SIGNALS]
 
 
-@cache
+@computed_once
 def every():
     return [pair for extrapolation in EXTRAPOLATIONS for pair in candidates(H, N, extrapolation)]
 

@@ -12,13 +12,14 @@ from orchestrator.studies.points.executor import Serial
 from orchestrator.studies.points.points import Work
 from orchestrator.studies.points.store import PointStore
 from tests.pages.markdown import ROOT, blocks
+from tests.support.once import shared_folder
 
 GUIDE = ROOT / ".docs" / "how-to" / "several-vendors.md"
 
 
 @cache
 def folder() -> Path:
-    """With the guide's case; the studies of one process share what they compute."""
+    """With the guide's case."""
     path = Path(mkdtemp())
     (text,) = (block.text for block in blocks(GUIDE) if block.path == "park.toml")
     (path / "park.toml").write_text(text, encoding="utf-8")
@@ -41,7 +42,9 @@ def studied(path=None, values=None, **wanted):
     plan = plan_interactions(
         load_case(path or folder() / "park.toml"), InteractionsRequest(values=values, **wanted)
     )
-    return Interactions(run_interactions(plan, Work(Serial(), PointStore(folder() / "points"))))
+    return Interactions(
+        run_interactions(plan, Work(Serial(), PointStore(shared_folder() / "points of parks")))
+    )
 
 
 park = cache(studied)

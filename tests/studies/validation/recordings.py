@@ -1,11 +1,10 @@
 """Recordings of a plant whose parameters are known: the converter behind the two-area system, in a coupled run."""
 
-from functools import cache
-
 import numpy as np
 import pandas as pd
 
 import orchestrator as gfor
+from tests.support.once import computed_once
 
 EVENT = {"time": 1.0, "component": "grid", "type": "load_change", "load": "load_2", "scale": 1.08}
 EVERY = 10  # steps between rows: 1 ms
@@ -13,9 +12,9 @@ NOISE = {"v_pu": 2e-5, "angle_deg": 1e-3, "p_mw": 0.6, "q_mvar": 0.6}
 """Standard deviations of good instruments, those of the powers as 4e-4 of the rating."""
 
 
-@cache
+@computed_once
 def run(scenario="pod_p", stop=6.0, scale=EVENT["scale"], **values):
-    """A coupled run through which the load of the other area steps; kept for all tests of a process."""
+    """A coupled run through which the load of the other area steps; kept for all tests of a session."""
     case = gfor.load("two_area").with_(
         events=[EVENT | {"scale": scale}],
         solver={"record_interval": "1 ms", "record_filter": "low-pass"},
