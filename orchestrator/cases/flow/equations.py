@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csc_array, csr_array, diags_array, hstack, vstack
+from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.linalg import spsolve
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
@@ -140,27 +140,27 @@ class FlowEquations:
 
     def jacobian(self, voltages: NDArray[np.complex128]) -> csc_array:
         """Derivatives of the mismatch by the unknown angles [rad] and by the unknown magnitudes [pu]."""
-        matrix, unit = self.matrix, voltages / np.abs(voltages)
-        current, v, direction = (
-            diags_array(matrix @ voltages),
-            diags_array(voltages),
-            diags_array(unit),
-        )
-        by_angle = 1j * (v @ (current - matrix @ v).conj())
-        by_magnitude = v @ (matrix @ direction).conj() + current.conj() @ direction
+        places, n = self._places, len(self.buses)
+        i, j, unit = places.rows, places.columns, voltages / np.abs(voltages)
+        currents = self.matrix @ voltages
+        leaving = -places.admittances * voltages[j]
+        leaving[-n:] += currents
+        by_angle = 1j * (voltages[i] * leaving.conj())
+        by_magnitude = voltages[i] * (places.admittances * unit[j]).conj()
+        by_magnitude[-n:] += currents.conj() * unit
         if self.loads_follow:
-            by_magnitude += diags_array(
-                self.drawn_as_current + 2 * self.drawn_as_impedance * np.abs(voltages)
+            by_magnitude[-n:] += self.drawn_as_current + 2 * self.drawn_as_impedance * np.abs(
+                voltages
             )
-        a, m = by_angle.tocsr(), by_magnitude.tocsr()
-        p, q = self.angle_buses, self.free_buses
-        return vstack(
-            [
-                hstack([a[p][:, p].real, m[p][:, q].real]),
-                hstack([a[q][:, p].imag, m[q][:, q].imag]),
-            ],
-            format="csc",
+        parts = by_angle.real, by_magnitude.real, by_angle.imag, by_magnitude.imag
+        return csc_array(
+            (np.concatenate(parts)[places.sources], places.indices, places.starts),
+            shape=(len(places.starts) - 1,) * 2,
         )
+
+    @cached_property
+    def _places(self) -> "_Places":
+        return _Places.of(self.matrix, self.angle_buses, self.free_buses)
 
     def dc_angles(self) -> NDArray[np.float64]:
         """Angles [rad] of the linear power flow: voltages of 1 pu, no losses, small angles."""
@@ -181,3 +181,39 @@ class FlowEquations:
         if len(known):
             angles[known] = spsolve(matrix[known][:, known], power[known])
         return angles
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Where the entries of a network's Jacobian stand, for all voltages: to put sparse blocks together costs more."""
+
+    # the admittance matrix's entries, the whole diagonal last
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    admittances: NDArray[np.complex128]
+    # the Jacobian by columns: starts of the columns, rows, and which of P by angle, P by magnitude, Q by angle and Q by
+    # magnitude of these entries, one behind the other, each is
+    starts: NDArray[np.int64]
+    indices: NDArray[np.int64]
+    sources: NDArray[np.int64]
+
+    @classmethod
+    def of(
+        cls, matrix: csr_array, angle_buses: NDArray[np.int64], free_buses: NDArray[np.int64]
+    ) -> "_Places":
+        n, entries, every = matrix.shape[0], matrix.tocoo(), np.arange(matrix.shape[0])
+        beside = entries.row != entries.col
+        rows = np.concatenate([entries.row[beside], every])
+        columns = np.concatenate([entries.col[beside], every])
+        of_angle, of_magnitude = np.full(n, -1), np.full(n, -1)
+        of_angle[angle_buses] = np.arange(len(angle_buses))
+        of_magnitude[free_buses] = len(angle_buses) + np.arange(len(free_buses))
+        equations, unknowns = (of_angle, of_magnitude), (of_angle, of_magnitude)
+        row = np.concatenate([equation[rows] for equation in equations for _ in unknowns])
+        column = np.concatenate([unknown[columns] for _ in equations for unknown in unknowns])
+        sources = np.flatnonzero((row >= 0) & (column >= 0))
+        sources = sources[np.lexsort((row[sources], column[sources]))]
+        count = len(angle_buses) + len(free_buses)
+        starts = np.concatenate([[0], np.cumsum(np.bincount(column[sources], minlength=count))])
+        admittances = np.concatenate([entries.data[beside], matrix.diagonal()])
+        return cls(rows, columns, admittances, starts, row[sources], sources)
