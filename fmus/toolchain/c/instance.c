@@ -9,6 +9,9 @@
 #include <stdlib.h>
 
 #define NV (DX + NX)
+#ifndef OUTPUTS_WAIT /* whether a step leaves outputs to whoever reads them */
+#define OUTPUTS_WAIT 0
+#endif
 enum status { OK, WARNING, DISCARD, ERROR, FATAL };
 enum phase { INSTANTIATED, INITIALISING, STEPPING, TERMINATED };
 enum { MOST_PARTS = 1000000 }; /* internal steps in one communication step */
@@ -109,7 +112,10 @@ static int prepare(struct instance *s, const char *resources) {
     const char *fault = read_model(&s->model, resources);
     if (fault) return say(s, ERROR, "the FMU's resources cannot be used: %.200s: %s; unpack the FMU again", resources ? resources : "(none)", fault);
     s->work = calloc((size_t)workspace_size(s->model.tape) + 1, sizeof *s->work);
-    if (s->work) begin(s->model.tape, s->work);
+    if (s->work) {
+        begin(s->model.tape, s->work);
+        OF(s->work)->outputs_when_read = OUTPUTS_WAIT;
+    }
 #else
     (void)resources;
     s->work = calloc((size_t)workspace_size() + 1, sizeof *s->work);
@@ -294,7 +300,7 @@ static int do_step(struct instance *s, double time, double step_size) {
         s->stale = 1;
         return DISCARD;
     }
-    s->stale = 0;
+    s->stale = OUTPUTS_WAIT;
     s->time = time + step_size;
     return OK;
 }

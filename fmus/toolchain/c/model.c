@@ -150,3 +150,4 @@ enum { SHORTEST_TEXT = 640 };
 #define GUID (s->model.guid)
 #define IDENTITY (s->model.head->identity)
 #define ROOM (OF(w)->size.slots)
+#define OUTPUTS_WAIT (NB > 0) /* a network has thousands that a step does not need */

@@ -145,7 +145,7 @@ static void rates(const double *z, const double *x, double *rate, double *w) {
 static int finish(double *z, double *w) {
     for (int i = 0; i < NX; ++i)
         if (!isfinite(z[X + i])) return i + 1;
-    at_states(w, OUTPUTS, z + X, z + Y);
+    if (!OF(w)->outputs_when_read) at_states(w, OUTPUTS, z + X, z + Y);
     return 0;
 }
 
@@ -302,15 +302,16 @@ TAPE void derivatives(double *z, double *w) {
 TAPE int glance(double *z, double *w, const unsigned *reference, size_t n, double *value) {
     const uint32_t *result = OF(w)->result[OUTPUTS], computed = (uint32_t)(AT_FIXED + OF(w)->size.fixed);
     const unsigned first = (unsigned)Y, end = (unsigned)DX;
-    int rates_wanted = 0;
+    int rates_wanted = 0, voltages_wanted = 0;
     if (!NB) return 0;
     for (size_t k = 0; k < n; ++k) {
         rates_wanted |= reference[k] >= end;
+        voltages_wanted |= reference[k] >= first;
         if (reference[k] >= first && reference[k] < end && result[reference[k] - first] >= computed) return 0;
     }
     enter(z, w);
     fill(w, X, z + X, NX);
-    settle_voltages(w, ALL);
+    if (voltages_wanted) settle_voltages(w, ALL);
     if (rates_wanted) evaluate(w, DERIVATIVES, z + DX);
     for (size_t k = 0; k < n; ++k) {
         const int is_output = reference[k] >= first && reference[k] < end;

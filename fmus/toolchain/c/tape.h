@@ -50,6 +50,7 @@ struct tape {
     int known; /* whether the slots of p and c, and those that they fix, are filled */
     int swept;   /* NOTHING, BUT_STATES or ALL: which currents and rows down are of what the slots of p, c, u and x hold */
     int settled; /* NOTHING, WANTED or ALL: which slots of v hold the voltages there */
+    int outputs_when_read; /* whether a step leaves a network's outputs to whoever reads them */
     int made_of_parameters; /* whether a network's factors are known to be of what the slots of p and c hold */
     const int32_t *stepwise, *given_at, *perm, *row, *col, *diag, *mrow, *mcol;
     struct reach reach;
