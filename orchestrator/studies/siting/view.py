@@ -43,7 +43,7 @@ _NAMED = 4  # things in a sentence; the others are counted
 _COLUMNS = (
     6  # modes in the terminal's table, the least damped; more columns leave no room for figures
 )
-_OUTSIDE = ", outside of --range"
+_OUTSIDE = f", outside of {Option.RANGE}"
 
 
 class Siting(PlaceRanking[SiteResult]):
@@ -502,7 +502,7 @@ def ranking_table(result: SiteResult) -> ShownTable:
     """The best buses, and what they do to the least damped modes."""
     title, number = f"{unit(result, '100')}; best first", len(result.intact.modes)
     if number > _COLUMNS:
-        title += f"; the {_COLUMNS} least damped of {number} modes, --json has all"
+        title += f"; the {_COLUMNS} least damped of {number} modes, {Option.JSON} has all"
     return _table_of(result, title, result.ranking[:_SHOWN], _COLUMNS)
 
 
