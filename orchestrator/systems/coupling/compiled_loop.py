@@ -191,6 +191,7 @@ class CompiledLoop:
         threads: int | None = 1,
     ) -> None:
         self._library, self._y, self._tracks = library, y, tracks
+        self._place = y.ctypes.data  # asked once: NumPy makes an object for each answer
         self._exchanges = [exchange for group in groups for exchange in group]
         n = len(self._exchanges)
         self._memory = apart(n * ctypes.sizeof(_Call), np.uint8)
@@ -280,7 +281,7 @@ class CompiledLoop:
                     ctypes.addressof(self._groups),
                     len(self._groups),
                     None if team is None else team.address,
-                    self._y.ctypes.data,
+                    self._place,
                     index + self.completed,
                     part,
                     step_size,

@@ -170,7 +170,7 @@ class CompiledMidpointLoop(CompiledLoop):
                 ctypes.addressof(self._calls),
                 ctypes.addressof(self._groups),
                 len(self._groups),
-                self._y.ctypes.data,
+                self._place,
                 self._direct.ctypes.data,
                 self.before.ctypes.data,
                 self._end.ctypes.data,
