@@ -5,11 +5,12 @@ smaller than the perturbation, or in noise the results differ, and the linear mo
 difference moves each mode follows from its eigenvectors, to first order."""
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
+import scipy.sparse as sp
 
 from orchestrator.core.arrays import Vector
 from orchestrator.core.errors import few
@@ -108,12 +109,19 @@ def doubts(
         if not perturbed or not modes:
             continue
         comparison = comparison or _Comparison(model, modes)
-        together = comparison.shifts(blocks, schedule, perturbed, kind)
+        varied = _varied(blocks, schedule, perturbed, kind)
+        together = comparison.shifts(varied)
         if together.max() <= LARGEST_SHIFT:
             continue
         turns = kind != _SMALL_ONLY and _may_turn(modes, together)
         turns = turns or (kind == _EDGE and bool(together.max() > _EDGE_SHIFT))
-        each = {name: comparison.shifts(blocks, schedule, [name], kind) for name in perturbed}
+        if comparison.has_rows_of(varied):
+            each = comparison.shifts_of_each(perturbed, varied)
+        else:
+            each = {
+                name: comparison.shifts(_varied(blocks, schedule, [name], kind))
+                for name in perturbed
+            }
         most = max(each, key=lambda name: float(each[name].max()))
         # A single component may shift a mode less than all components together.
         guilty = [name for name, shifts in each.items() if shifts.max() > LARGEST_SHIFT] or [most]
@@ -130,6 +138,16 @@ def doubts(
     return found
 
 
+def _varied(blocks: Blocks, schedule: Schedule, names: Sequence[str], kind: int) -> LinearModel:
+    """The model in which some components are replaced by one of their variants."""
+    other = copy.copy(blocks)
+    other.components = dict(blocks.components)
+    for name in names:
+        component = blocks.components[name]
+        other.components[name] = replace(component, **component.variants[kind]._asdict())
+    return compose(other, schedule)
+
+
 class _Comparison:
     """A model and its modes as arrays, with which each of its variants is compared.
 
@@ -137,31 +155,86 @@ class _Comparison:
 
     def __init__(self, model: LinearModel, modes: Sequence[Mode]) -> None:
         self._model = model
-        self._left = np.array([[mode.left[name] for mode in modes] for name in model.names])
-        self._right = np.array([[mode.shape[name] for mode in modes] for name in model.names])
+        self._left = _columns([mode.left for mode in modes], model.names)
+        self._right = _columns([mode.shape for mode in modes], model.names)
         self._values = np.array([mode.eigenvalue for mode in modes])
         self._slow = np.abs(self._values) <= SLOW
         self._image = _image(model, self._right)
 
-    def shifts(self, blocks: Blocks, schedule: Schedule, names: Sequence[str], kind: int) -> Vector:
-        """Relative shift of every mode if some components are replaced by one of their variants."""
-        other = copy.copy(blocks)
-        other.components = dict(blocks.components)
-        for name in names:
-            component = blocks.components[name]
-            other.components[name] = replace(component, **component.variants[kind]._asdict())
-        model, varied = self._model, compose(other, schedule)
+    def shifts(self, varied: LinearModel) -> Vector:
+        """Relative shift of every mode from the model to a variant of it."""
+        model = self._model
         if varied.names != model.names:  # even the pattern of direct feed-through differs
             return np.full(len(self._values), np.inf)
         difference = _image(varied, self._right) - self._image
-        moved = _movement(self._values, self._left, difference, model.step_size)
-        shifts: Vector = np.abs(moved) / np.maximum(np.abs(self._values), _SLOWEST)
+        shifts = self._relative(_along(self._left, difference))
         slow = self._slow
         if len(model.names) <= _DENSE and (shifts[slow] > LARGEST_SHIFT).any():
             shifts[slow] = np.minimum(
                 shifts[slow], shift_of_slowest(model, varied, SLOW) / _SLOWEST
             )
         return shifts
+
+    def has_rows_of(self, varied: LinearModel) -> bool:
+        """Tell whether `shifts_of_each` holds for a variant; small models need each variant whole, for slow modes."""
+        own = self._model
+        return len(own.names) > _DENSE and (varied.names, varied.wires) == (own.names, own.wires)
+
+    def shifts_of_each(self, names: Sequence[str], together: LinearModel) -> dict[str, Vector]:
+        """The shifts by each component alone.
+
+        ``together``: the model in which all of them are replaced."""
+        changes = _RowChanges(self._model, together, self._left, self._right)
+        return {name: self._relative(changes.moved_by(name)) for name in names}
+
+    def _relative(self, moved: Vector) -> Vector:
+        rates = _as_rates(moved, self._values, self._model.step_size)
+        shifts: Vector = np.abs(rates) / np.maximum(np.abs(self._values), _SLOWEST)
+        return shifts
+
+
+def _columns(vectors: Sequence[Mapping[str, complex]], names: Sequence[str]) -> Vector:
+    """Vectors as columns, with their states in the order of the names."""
+    rows = [list(map(vector.__getitem__, names)) for vector in vectors]
+    return np.ascontiguousarray(np.array(rows).T)
+
+
+class _RowChanges:
+    """Changes in the equations of a model where components are replaced by variants.
+
+    With changes written as Δ, and w as the outputs in a mode, (I − K − ΔK)·Δw = ΔH·r + ΔK·w. A component's equations
+    are rows of their own, so that a model in which all are replaced holds the rows of each, and Δw follows from its few
+    own outputs."""
+
+    def __init__(
+        self, model: LinearModel, together: LinearModel, left: Vector, right: Vector
+    ) -> None:
+        columns, self._model, self._left = _parts(right), model, left
+        outputs = model.settle(model.H @ columns)
+        F, self._G, H, self._K = (
+            sp.csr_array(getattr(together, name) - getattr(model, name)) for name in "FGHK"
+        )
+        self._of_states, self._of_outputs = (
+            F @ columns + self._G @ outputs,
+            H @ columns + self._K @ outputs,
+        )
+        self._from_outputs = model.G.T @ left
+        self._owners_of_states, self._owners_of_outputs = (
+            np.array([name.partition(".")[0] for name in names])
+            for names in (model.names, model.wires)
+        )
+
+    def moved_by(self, component: str) -> Vector:
+        """lᴴ·(A' − A)·r of each mode, where one component alone is replaced."""
+        states = np.flatnonzero(self._owners_of_states == component)
+        outputs = np.flatnonzero(self._owners_of_outputs == component)
+        unit = np.zeros((len(self._model.wires), len(outputs)))
+        unit[outputs, np.arange(len(outputs))] = 1.0
+        reached = self._model.settle(unit)
+        back = np.eye(len(outputs)) - self._K[outputs] @ reached
+        moved_outputs = reached @ np.linalg.solve(back, self._of_outputs[outputs])
+        moved_states = self._of_states[states] + self._G[states] @ moved_outputs
+        return _along(self._left[states], moved_states) + _along(self._from_outputs, moved_outputs)
 
 
 def _may_turn(modes: Sequence[Mode], shifts: Vector) -> bool:
@@ -176,23 +249,31 @@ def eigenvalue_shifts(
     """Δλ = lᴴ·(A' − A)·r [rad/s] of each mode, a column of ``left`` and ``right``; of a step map divided by μ·H, as
     λ = ln μ / H."""
     difference = _image(varied, right) - _image(model, right)
-    return _movement(eigenvalues, left, difference, model.step_size)
+    return _as_rates(_along(left, difference), eigenvalues, model.step_size)
 
 
 def _image(model: LinearModel, right: Vector) -> Vector:
     """A·r for columns r, the real parts and then the imaginary ones, as the factors inside are real."""
-    return model.apply(np.hstack([right.real, right.imag]))
+    return model.apply(_parts(right))
 
 
-def _movement(
-    eigenvalues: Vector, left: Vector, difference: Vector, step_size: float | None
-) -> Vector:
-    """lᴴ·d of each mode [rad/s], where d are real parts and then imaginary ones."""
-    n = len(eigenvalues)
-    moved = (left.conj() * (difference[:, :n] + 1j * difference[:, n:])).sum(axis=0)
-    if step_size is not None:
-        moved = moved / (np.exp(eigenvalues * step_size) * step_size)
-    return np.asarray(moved)
+def _parts(columns: Vector) -> Vector:
+    """The real parts of columns, and then the imaginary ones."""
+    return np.hstack([columns.real, columns.imag])
+
+
+def _along(left: Vector, difference: Vector) -> Vector:
+    """lᴴ·d of each mode, where d are real parts and then imaginary ones."""
+    n = left.shape[1]
+    moved: Vector = (left.conj() * (difference[:, :n] + 1j * difference[:, n:])).sum(axis=0)
+    return moved
+
+
+def _as_rates(moved: Vector, eigenvalues: Vector, step_size: float | None) -> Vector:
+    """Shifts of eigenvalues [rad/s] from those of the model's matrix."""
+    if step_size is None:
+        return moved
+    return np.asarray(moved / (np.exp(eigenvalues * step_size) * step_size))
 
 
 def shift_of_slowest(model: LinearModel, varied: LinearModel, radius: float) -> float:

@@ -1,5 +1,7 @@
 """FMUs that are not linear where they are linearised: the modes that they move are questioned, with the component."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,11 +11,13 @@ from fmus.toolchain.python_fmu import PythonFmu
 from fmus.toolchain.symbols import fabs, fmax, fmin, sin
 from orchestrator.core.errors import AnalysisError
 from orchestrator.devices.fmi.description import read_description
+from orchestrator.linear.doubts import linearity
 from orchestrator.linear.doubts.linearity import doubts, tell
+from orchestrator.linear.models.component_linearization import StepMap
 from orchestrator.linear.models.linearization import Blocks, compose
 from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.linear.spectra.modes import find_modes
-from orchestrator.studies.modes.modes import compute_modes
+from orchestrator.studies.modes.modes import compute_modes, running
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.schedule import gauss_seidel
 from orchestrator.systems.coupling.system import System
@@ -192,3 +196,29 @@ def test_no_command_calls_stable_what_stands_at_a_limit_s_edge(gfor, tmp_path, c
     assert "not known" in first
     assert "│ stable" not in first
     assert "answers differently up and down" in " ".join(shown.split())
+
+
+def test_a_large_model_has_the_same_shifts_without_each_variant_whole(monkeypatch):
+    """Planted: every component, the grid among them, answers by up to 30 % differently, and the grid's outputs follow
+    its inputs at once: what a machine changes comes back to it within the same step."""
+    with running(prepare_one("wscc9", "base")) as master:
+        find_operating_point(master)
+        blocks = Blocks(master)
+        random = np.random.default_rng(1)
+        grid = blocks.components["grid"]
+        at_once = 0.1 * random.standard_normal(grid.D.shape)
+        blocks.components["grid"] = replace(grid, D=grid.D + at_once)
+        for name, c in blocks.components.items():
+            matrices = (c.A, c.B, c.C, c.D)
+            varied = StepMap(*(m * (1 + random.uniform(-0.3, 0.3, m.shape)) for m in matrices))
+            blocks.components[name] = replace(c, variants=(varied,))
+        model = compose(blocks, master.schedule)
+        modes = find_modes(model)
+        whole = doubts(blocks, master.schedule, model, modes)
+        monkeypatch.setattr(linearity, "_DENSE", 0)
+        by_rows = doubts(blocks, master.schedule, model, modes)
+    assert [doubt.component for doubt in whole] == list(blocks.components)
+    assert [doubt.component for doubt in by_rows] == list(blocks.components)
+    for one, other in zip(by_rows, whole, strict=True):
+        assert one.shift == pytest.approx(other.shift, rel=1e-9)
+        assert one.mode is other.mode
