@@ -86,7 +86,11 @@ def _spaced(expression: str, known: Sequence[str]) -> str:
 
 
 def strongest_modes(
-    curve: xr.DataArray, start: float, stop: float | None = None, *, order: int | None = None
+    curve: xr.DataArray,
+    start: float | None = None,
+    stop: float | None = None,
+    *,
+    order: int | None = None,
 ) -> list[IdentifiedMode]:
     """Return what a signal rings with between two times [s], strongest first; see `identify_modes`.
 
@@ -96,7 +100,7 @@ def strongest_modes(
     on. Each mode has its doubts."""
     window = curve.sel(time=slice(start, stop))
     found = _modes_of(window, order=order)
-    begin, end = float(window["time"][0]), float(window["time"][-1])
+    begin, end = _ends(window)
     try:
         later = window.sel(time=slice(begin + SHORTER * (end - begin), None))
         others = _modes_of(later, COARSER)
@@ -107,6 +111,16 @@ def strongest_modes(
     whole = part_of(window["time"].values, window.values, found)
     kept = worth_showing(found, end - begin, _WEAKEST)
     return with_doubts(kept, end - begin, others, halves, whole.noise_like)
+
+
+def modes_without_doubts(curve: xr.DataArray, *, order: int | None = None) -> list[IdentifiedMode]:
+    """The same modes as `strongest_modes` returns of a whole signal, of which nobody asks for doubts."""
+    begin, end = _ends(curve)
+    return worth_showing(_modes_of(curve, order=order), end - begin, _WEAKEST)
+
+
+def _ends(window: xr.DataArray) -> tuple[float, float]:
+    return float(window["time"][0]), float(window["time"][-1])
 
 
 def _part(window: xr.DataArray) -> WindowPart:

@@ -5,7 +5,7 @@ per unit of the rating, its largest magnitude, its mean, and the mean of its mag
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,13 +15,19 @@ from orchestrator.core.errors import CosimError
 from orchestrator.core.late import xr
 from orchestrator.linear.signals.identification import IdentifiedMode
 from orchestrator.output.results.readers import LINE_FREQUENCY
-from orchestrator.studies.signals.comparison import strongest_modes
+from orchestrator.studies.signals.comparison import modes_without_doubts, strongest_modes
 from orchestrator.studies.signals.measured import order_of
 from orchestrator.studies.validation.record import Recording
 from orchestrator.studies.validation.windows import Windows
 
 SIGNALS = ("p", "q", "i_p", "i_q")
 """Active and reactive power, active and reactive current, all in pu of the rating and into the grid."""
+
+ModePair = tuple[IdentifiedMode | None, IdentifiedMode | None]
+"""A mode of the measured signal and the same one of the simulated; None where there is none."""
+
+Identify = Callable[..., list[IdentifiedMode]]
+"""Modes of a signal, strongest first, at an ``order``."""
 
 _MOST_LAG = 0.25  # longest delay that is looked for [s]
 _LEAST_MOVES = 0.005  # movement [pu] that has a delay, a step or a ring-down
@@ -108,7 +114,7 @@ class SignalFigures:
 
     delay: float | None  # by which the measured one comes later [s]
     steps: tuple[StepFigures | None, StepFigures | None]
-    modes: tuple[IdentifiedMode | None, IdentifiedMode | None]
+    modes: ModePair
     modes_doubt: tuple[float, float] = (
         0.0,
         0.0,
@@ -249,20 +255,20 @@ def step_of(recording: Recording, values: Numbers, windows: Windows) -> StepFigu
     return StepFigures(step, rise, max(0.0, float(way.max()) - 1), settling)
 
 
-def ring_downs(
+def _ring_downs(
     recording: Recording,
-    measured: Numbers,
-    simulated: Numbers,
+    signals: tuple[Numbers, Numbers],
     windows: Windows,
     more: int = 0,
-) -> tuple[IdentifiedMode | None, IdentifiedMode | None]:
+    identify: Identify = modes_without_doubts,
+) -> ModePair:
     """The mode with which the measured signal rings the most after the event, and the simulated one's same mode.
 
     Both have the measured one's order: at an order of its own, each would have other modes. ``more``: how many
     exponentials are added to it."""
-    curves = [_ringing(recording, values, windows) for values in (measured, simulated)]
+    curves = [_ringing(recording, values, windows) for values in signals]
     order = 0 if curves[0] is None else max(2, order_of(curves[0]) + more)
-    found = [_modes(recording, one, windows, order) for one in curves]
+    found = [_modes(recording, one, windows, order, identify) for one in curves]
     if not found[0]:
         return None, None
     strongest = found[0][0]
@@ -275,9 +281,7 @@ def ring_downs(
     return strongest, same
 
 
-def modes_apart(
-    modes: tuple[IdentifiedMode | None, IdentifiedMode | None],
-) -> tuple[float, float] | None:
+def modes_apart(modes: ModePair) -> tuple[float, float] | None:
     """By how much the simulated mode is off: frequency [%], damping [points of percent]; None without both."""
     measured, own = modes
     if measured is None or own is None:
@@ -290,7 +294,7 @@ def _doubt_of_modes(
     recording: Recording,
     signals: tuple[Numbers, Numbers],
     windows: Windows,
-    found: tuple[IdentifiedMode | None, IdentifiedMode | None],
+    found: ModePair,
 ) -> tuple[float, float]:
     """How far the difference of two modes moves by other looks at the ring-down.
 
@@ -302,7 +306,7 @@ def _doubt_of_modes(
     seen = [here]
     for part, more in _OTHER_LOOKS:
         later = replace(windows, end=windows.end + part * rest)
-        there = modes_apart(ring_downs(recording, *signals, later, more))
+        there = modes_apart(_ring_downs(recording, signals, later, more))
         seen.append((-here[0], -here[1]) if there is None else there)
     frequency, damping = 0.5 * np.ptp(np.array(seen), axis=0)
     return float(frequency), float(damping)
@@ -320,14 +324,18 @@ def _ringing(recording: Recording, values: Numbers, windows: Windows) -> xr.Data
 
 
 def _modes(
-    recording: Recording, curve: xr.DataArray | None, windows: Windows, order: int
+    recording: Recording,
+    curve: xr.DataArray | None,
+    windows: Windows,
+    order: int,
+    identify: Identify,
 ) -> list[IdentifiedMode]:
     """The modes of a ring-down that its length and its samples can show."""
     if curve is None:
         return []
     times = curve["time"].values
     try:
-        found = strongest_modes(curve, float(times[0]), order=order)
+        found = identify(curve, order=order)
     except CosimError:
         return []
     slowest = _SLOWEST_PERIODS / (recording.length - windows.end)
@@ -348,7 +356,7 @@ def compare_signals(
     measured, own = recording.power, simulated
     found = {}
     for name, y, x in (("p", measured.real, own.real), ("q", measured.imag, own.imag)):
-        modes = ring_downs(recording, y, x, windows)
+        modes = _ring_downs(recording, (y, x), windows, identify=strongest_modes)
         found[name] = SignalFigures(
             delay_between(recording, y, x, windows),
             (step_of(recording, y, windows), step_of(recording, x, windows)),
