@@ -96,7 +96,8 @@ def validate(
         Another model of the same plant, such as its EMT model beside the phasor model: driven, compared and judged in
         the same way. It takes those ``values`` that it knows.
     explain
-        Whether to look for one cause that would explain the errors: a switch, a number, a delay or a limit.
+        Whether to look for the cause that would explain the errors: a switch, one number or two, a delay or a limit of
+        the current.
     start, stop
         The part of each recording that is used [s].
     step

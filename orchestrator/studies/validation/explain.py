@@ -1,4 +1,4 @@
-"""The one cause that would explain what a model does otherwise than the plant: a value, a switch, a delay or a limit.
+"""The cause that would explain what a model does otherwise than the plant: a value or two, a switch, a delay, a limit.
 
 Causes are tried where they can be: switches and kinds by a run each, numbers by one difference each, of which those
 that promise the most are followed. Delays and limits are read from the responses. The voltage between two samples,
