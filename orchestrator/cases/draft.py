@@ -84,6 +84,8 @@ class Findings:
     ratings: dict[str, float] = field(default_factory=dict)
     # components of other scenarios to which a layer gives values, by ``component.variable``, with the place.
     absent: dict[str, str] = field(default_factory=dict)
+    # limits that the case widens, by ``component.variable``: the value of the files [pu], and where it is widened.
+    widened: dict[str, tuple[float, str]] = field(default_factory=dict)
     faults: list[SolvedFault] = field(default_factory=list)  # of fewer phases, and open poles
     not_reached: list[float] = field(default_factory=list)
     # components whose form the network cannot take, each with its model; what follows from that is not noted.

@@ -242,6 +242,7 @@ class UnitsTable(Table):
     uel: str | None = None
     generator_parameters: dict[str, Any] = {}
     converter_parameters: dict[str, Any] = {}
+    widened_limits: dict[str, Any] = {}
 
 
 class ConnectionTable(Table):

@@ -29,6 +29,7 @@ from orchestrator.cases.networks.regions import Regions
 from orchestrator.cases.questions.contradictions import doubts
 from orchestrator.cases.questions.idle_values import Idle, idle_values
 from orchestrator.cases.questions.plausibility import check_plausibility, question_loading
+from orchestrator.cases.questions.widened_limits import widened_questions
 from orchestrator.cases.scenario.case_network import (
     check_network_is_used,
     find_network,
@@ -312,6 +313,7 @@ class Preparer:
         check_plausibility(draft)
         flow = None if draft.found.problems else power_flow_of(draft)
         question_loading(draft, flow)
+        draft.found.questions += widened_questions(draft)
         clock = clock_of(draft, step_size)
         told: frozenset[str] = frozenset()
         if clock is not None:

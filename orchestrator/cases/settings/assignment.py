@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from orchestrator.cases.draft import Draft
+from orchestrator.cases.form.control_limits import is_limit, is_wider
 from orchestrator.cases.form.names import SERVICE, STATES, close_names, hint_at, whose
 from orchestrator.cases.form.schema import ConventionsTable, Value
 from orchestrator.cases.form.values import TWICE, check_system_base, convert, flatten, given_twice
@@ -87,6 +88,7 @@ def assign_values(draft: Draft) -> None:
                 draft.note(draft.place_of_value(name, group, key.split(".")), f"{key}: {TWICE}")
             for path, value in flat:
                 _assign(draft, name, ".".join(path), value, draft.place_of_value(name, group, path))
+    _widen_limits(draft)
     for layer in draft.given.layers:
         # made when the components were added
         chosen = [(choice.pattern, choice.place) for choice in layer.natives]
@@ -95,6 +97,32 @@ def assign_values(draft: Draft) -> None:
             _check_component(draft, pattern, place)
         for key, value in layer.values.items():
             _assign_key(draft, key, value, layer.place(key))
+
+
+def _widen_limits(draft: Draft) -> None:
+    """Widen limits of machines' controls as the case says; one that the files have wider stays as it is there.
+
+    A part that another scenario chooses need not have the limit."""
+    units = draft.given.case.units
+    for path, value in flatten(units.widened_limits) if units else ():
+        name, _, variable = ".".join(path).partition(".")
+        where = draft.given.place("units", "widened_limits", *path)
+        if not is_limit(variable):
+            text = (
+                f"{variable!r} is no limit of an exciter or a governor; write it like "
+                "sg1.exciter.V_RMAX = 7.5, or remove it"
+            )
+            draft.note(where, text)
+            continue
+        _check_component(draft, name, where)
+        if not _has(draft, name, variable):
+            continue
+        plan = draft.system.components[name]
+        given = plan.number(variable)
+        wanted = convert_value(draft, plan.description.variables[variable], value, where)
+        if wanted is not None and is_wider(variable, float(wanted), given):
+            _assign(draft, name, variable, value, where)
+            draft.found.widened[f"{name}.{variable}"] = given, where
 
 
 def convert_value(
