@@ -84,6 +84,7 @@ class Option(Spelling, Enum):
     NO_CHECK = "no-check", ALONE
     NO_CSV = "no-csv", ALONE
     NO_LOAD_PARTS = "no-load-parts", ALONE
+    NO_WIDENED_LIMITS = "no-widened-limits", ALONE
     ONLY = "only"
     OUT = "out", "folder"
     OUTAGES = "outages"

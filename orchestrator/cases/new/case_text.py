@@ -15,8 +15,10 @@ from orchestrator.cases.networks.data import bus_name
 from orchestrator.cases.networks.record_use import details, in_one_line
 from orchestrator.cases.new.converter_places import ConverterPlace
 from orchestrator.cases.new.wanted_case import WantedCase
+from orchestrator.cases.new.widened_limits import HEADROOM, WidenedLimit
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import few
+from orchestrator.core.options import Option
 
 _TEMPLATE = Path(__file__).with_suffix(".txt").read_text(encoding="utf-8")
 _EMT_STEP = 1e-4  # [s]
@@ -62,8 +64,9 @@ class CaseText:
         pods: Mapping[str, bool] = MappingProxyType({}),
         fault_bus: str = "",
         moved: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+        widened: Sequence[WidenedLimit] = (),
     ) -> None:
-        self._pods, self.moved = pods, moved
+        self._pods, self.moved, self.widened = pods, moved, widened
         self._wanted, self._sources, self._base, self._places = wanted, sources, base, places
         self._stray, self._stray_why = _stray_capacitance(base) if base else (0.05, "")
         self._network = base.network if base else None
@@ -98,6 +101,12 @@ class CaseText:
             )
         lines.append(f"loads: {self._loads()}")
         lines += [f"controls: {self._moves()}"] if self._wanted.move_controls else []
+        if self.widened:
+            lines.append(
+                f"limits: {len(self.widened)} widened to {HEADROOM:g} pu beyond the operating point ("
+                + Option.NO_WIDENED_LIMITS
+                + " keeps them)"
+            )
         lines.append(
             f"models: {self._wanted.kind}; stray_B of EMT models: {self._stray:g} pu{self._stray_why}"
         )
@@ -126,6 +135,16 @@ class CaseText:
             for name, (old, new) in self.moved.items()
         ]
         return "\n".join(["\n[components.grid.parameters]", *rows, ""])
+
+    def _limits(self) -> str:
+        """Return the table of the case with the limits that are widened."""
+        if not self.widened:
+            return ""
+        rows = [
+            f"{x.name} = {x.taken:g}    # {x.given:g} in {self._sources['dyr'].name}; {x.at_start:.4g} at the start"
+            for x in self.widened
+        ]
+        return "\n".join(["\n[units.widened_limits]", *rows, ""])
 
     def _loads(self) -> str:
         """How the loads follow the voltage."""
@@ -185,6 +204,7 @@ class CaseText:
             units=self._units(),
             generator="" if "dyr" in self._sources else "_st1",
             suffix=suffix,
+            widened=self._limits(),
             converter=self._converter(),
             scenarios="\n".join(scenarios),
         )

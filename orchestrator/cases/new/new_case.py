@@ -22,6 +22,7 @@ from orchestrator.cases.new.network_files import sources_of
 from orchestrator.cases.new.question_comments import LINE_OF_TEXT, with_questions
 from orchestrator.cases.new.refusal import of_what_was_given
 from orchestrator.cases.new.wanted_case import WantedCase
+from orchestrator.cases.new.widened_limits import limits_to_widen
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import CaseError, InputError, Problem
 from orchestrator.core.options import Option
@@ -76,19 +77,18 @@ def _compose(wanted: WantedCase, sources: dict[str, Path]) -> NewCase:
         wanted = replace(
             wanted, slack=wanted.slack or largest, frequency=wanted.frequency or "50 Hz"
         )
-    first = CaseText(
-        wanted, sources, fault_bus=_largest_load(CaseText(wanted, sources).text, wanted)
-    )
-    base = _prepared(first.text, wanted, ["base"])[0]
-    if wanted.move_controls:
-        moved = _moved_controls(first.text, wanted, base)
-        first = CaseText(wanted, sources, fault_bus=first.fault_bus, moved=moved)
-        base = _prepared(first.text, wanted, ["base"])[0]
+    first, base = _without_converters(wanted, sources)
     places: list[ConverterPlace] = []
     for converter in wanted.converters:
         places.append(place_for(converter, base, buses_by_name(wanted.files), places))
     draft = CaseText(
-        wanted, sources, base, with_names(places), _switched(device), moved=first.moved
+        wanted,
+        sources,
+        base,
+        with_names(places),
+        _switched(device),
+        moved=first.moved,
+        widened=first.widened,
     )
     if not places and wanted.kind == "phasor" and draft.fault_bus == first.fault_bus:
         # nothing of the scenario ``base`` has changed, and a large network takes seconds to prepare
@@ -100,6 +100,24 @@ def _compose(wanted: WantedCase, sources: dict[str, Path]) -> NewCase:
     black_box = device is not None and not device.can_save_state
     placed = tuple(str(_renumber(question, numbers)) for question in questions)
     return NewCase(text, tuple(draft.assumed(len(placed))), tuple(scenarios), placed, black_box)
+
+
+def _without_converters(
+    wanted: WantedCase, sources: dict[str, Path]
+) -> tuple[CaseText, PreparedScenario]:
+    """Return the text of the network alone, and its base case: with controls moved and limits widened."""
+    fault_bus = _largest_load(CaseText(wanted, sources).text, wanted)
+    text = CaseText(wanted, sources, fault_bus=fault_bus)
+    base = _prepared(text.text, wanted, ["base"])[0]
+    if wanted.move_controls:
+        moved = _moved_controls(text.text, wanted, base)
+        text = CaseText(wanted, sources, fault_bus=fault_bus, moved=moved)
+        base = _prepared(text.text, wanted, ["base"])[0]
+    widened = limits_to_widen(base) if wanted.widen_limits and "dyr" in sources else []
+    if widened:
+        text = CaseText(wanted, sources, fault_bus=fault_bus, moved=text.moved, widened=widened)
+        base = _prepared(text.text, wanted, ["base"])[0]
+    return text, base
 
 
 def _check_controls(wanted: WantedCase, sources: Mapping[str, Path]) -> None:

@@ -43,6 +43,7 @@ class WantedCase:
     replace: tuple[str, ...] = ()
     load_parts: bool = True
     move_controls: bool = False
+    widen_limits: bool = True
     command: str = "gfor new"
 
     @property

@@ -176,6 +176,7 @@ def _wanted_case(options: argparse.Namespace) -> WantedCase:
         dyr_approximate=options.dyr_approximate,
         replace=tuple(options.replace),
         load_parts=not options.no_load_parts,
+        widen_limits=not options.no_widened_limits,
         move_controls=options.move_controls,
         command=f"gfor {shlex.join(sys.argv[1:])}" if sys.argv[1:2] == ["new"] else "gfor new",
     )

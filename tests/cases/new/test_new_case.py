@@ -195,7 +195,7 @@ def test_what_the_device_brings_is_told_apart_from_the_dispatch(files):
 
 def test_a_case_that_cannot_start_is_said_at_once(gfor, files):
     five_machines(files[0].parent, highest=0.3)  # the valves' end, below what the machines feed
-    code, out, err = gfor(*files, "--out", files[0].parent / "case.toml")
+    code, out, err = gfor(*files, "--no-widened-limits", "--out", files[0].parent / "case.toml")
     assert code == 2
     assert "scenario 'base': sg" in err
     assert (
