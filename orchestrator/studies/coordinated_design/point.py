@@ -9,6 +9,7 @@ import numpy as np
 from orchestrator.cases.case import Case
 from orchestrator.core.arrays import Complex, Vector
 from orchestrator.core.errors import AnalysisError
+from orchestrator.core.options import Option, command
 from orchestrator.linear.models.apart import standing_apart
 from orchestrator.linear.models.component_linearization import ComponentLinearization
 from orchestrator.linear.models.linear_model import LinearModel
@@ -201,8 +202,11 @@ def _at(
     warnings = (*warnings, *(one.sentence for one in point.held), *linear.doubts)
     if len(model.names) > _MOST_STATES:
         raise AnalysisError(
-            f"the system has {len(model.names)} states; a design needs all eigenvalues, of at most "
-            f"{_MOST_STATES}"
+            f"the system has {len(model.names)} states; a design over operating points computes all eigenvalues at "
+            f"each, of at most {_MOST_STATES} states. Design a controller at one point, where its mode is followed: "
+            + command(
+                "design CASE", (Option.CONTROLLER, places[0].controller if places else "pod_p")
+            )
         )
     loops = measure(master, model, blocks, places) if places else None
     found = _modes(case, model, loops, warnings, doubtful=bool(linear.doubts))

@@ -407,6 +407,16 @@ def test_converters_are_ranked_by_what_a_controller_there_gives(planned, store):
     assert first.shift == pytest.approx(abs(rated_of(plan, found)[0].residues()[P]))
 
 
+def test_a_system_too_large_for_all_eigenvalues_is_told_what_goes_instead(
+    planned, store, monkeypatch
+):
+    monkeypatch.setattr(point, "_MOST_STATES", 10)
+    plan = planned("pod_p")
+    (found, *_) = modes_at(plan, plan.off, plan.candidates, Work(Serial(), store))
+    assert "computes all eigenvalues at each, of at most 10 states" in found.text
+    assert found.text.endswith("`gfor design CASE --controller pod_p`")
+
+
 @pytest.mark.parametrize(
     ("wanted", "said"),
     [
