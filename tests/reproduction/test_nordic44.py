@@ -122,8 +122,7 @@ def test_the_fmus_without_controls():
         slow_swings(m.eigenvalue for m in result.modes),
     )
     assert not result.stability.stable
-    (told,) = result.warnings
-    assert "is the common speed" in told
+    assert not result.warnings  # the angles part: it is no drift of the common speed
 
 
 @pytest.mark.slow

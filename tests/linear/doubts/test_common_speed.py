@@ -6,6 +6,9 @@ import pytest
 from orchestrator.linear.doubts.common_speed import is_common_speed, tell_common_speed
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.stability import judge
+from orchestrator.studies.modes.modes import compute_modes
+from orchestrator.studies.runs.answer_of_modes import of_modes
+from tests.support.scenarios import prepare_one
 
 SPEEDS = ("sg1.omega", "sg2.omega")
 INERTIA = 5.0
@@ -43,6 +46,55 @@ def test_machines_that_lose_each_other_are_not_told_so():
     assert verdict.mode.eigenvalue == pytest.approx(rate, rel=1e-6)
     assert rate < 0.5
     assert tell_common_speed(verdict, SPEEDS) == ()
+
+
+def with_governor(gate):
+    """Both machines with torque that falls with speed, and the first one's gate, which follows ``gate``·ω within
+    1 s but moves no torque, so that the drift stays."""
+    A = np.zeros((5, 5))
+    A[:4, :4] = two_machines(1.0, 0.4).A
+    A[4, [1, 4]] = gate, -1.0
+    return LinearModel.from_matrix(
+        A, ("sg1.delta", SPEEDS[0], "sg2.delta", SPEEDS[1], "sg1.governor.gate"), None
+    )
+
+
+@pytest.mark.parametrize(("gate", "told"), [(-20.0, False), (-3.0, False), (0.0, True)])
+def test_a_governor_that_acts_is_not_passed_over(gate, told):
+    """At rest within its dead band it moves by nothing, and the drift is that without a governor."""
+    verdict = judge(with_governor(gate))
+    assert verdict.stable is False
+    assert bool(tell_common_speed(verdict, SPEEDS)) is told
+
+
+@pytest.mark.parametrize(("synchronising", "told"), [(0.0001, False), (1.0, True)])
+def test_speeds_alike_do_not_hide_angles_that_part(synchronising, told):
+    """Unlike torques part the angles by Δd/2K per unit of the common speed; speeds then differ by λ/ω_b times that."""
+    A = two_machines(synchronising, 0.4).A.copy()
+    A[3, 3] += 0.002
+    verdict = judge(
+        LinearModel.from_matrix(A, ("sg1.delta", SPEEDS[0], "sg2.delta", SPEEDS[1]), None)
+    )
+    first, second = (verdict.mode.shape[speed].real for speed in SPEEDS)
+    assert abs(first - second) < 0.02 * abs(first)
+    assert bool(tell_common_speed(verdict, SPEEDS)) is told
+
+
+@pytest.mark.slow
+def test_a_line_near_its_limit_is_not_told_as_a_drift():
+    """At 85.6° both governors act, and the angles part by 26° while the speed moves 0.1 %."""
+    ready = prepare_one("two_area", "pod_pq", {"grid.load_2.scale": 0.655})
+    result = compute_modes(ready)
+    assert result.stability.mode.eigenvalue == pytest.approx(0.0142, abs=1e-4)
+    assert not any("common speed" in text for text in result.warnings)
+    assert "common speed" not in of_modes(result).remark
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("case", "scenario"), [("kundur", "manual"), ("wscc9", "base")])
+def test_a_drift_without_a_governor_is_told(case, scenario):
+    result = compute_modes(prepare_one(case, scenario))
+    assert any("No governor acts here" in text for text in result.warnings)
 
 
 def test_a_swing_that_grows_and_a_stable_system_are_silent():
