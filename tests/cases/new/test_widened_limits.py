@@ -135,6 +135,12 @@ def test_a_point_beyond_a_widened_limit_is_refused(closed):
         running(beyond)
 
 
+def test_the_scenario_with_a_converter_starts_with_the_limits_of_the_base(tmp_path):
+    path = new_case(tmp_path, highest=0.3, converters=["bus 13, 100 MVA, 60 MW, less sg3"])
+    assert {*widened(path)} == {f"sg{n}.governor.V_MAX" for n in DROOPS}
+    running(prepare_one(path, "converter")).close()
+
+
 def test_nothing_is_widened_where_all_start(tmp_path):
     path = new_case(tmp_path)
     assert "widened_limits" not in path.read_text(encoding="utf-8")
@@ -146,6 +152,7 @@ def test_only_limits_of_exciters_and_governors_are_widened(closed):
     bad = closed.with_name("bad.toml")
     for row, said in (
         ("sg1.machine.H = 9", "'machine.H' is no limit of an exciter or a governor"),
+        ("gfor1.voltage_control.i_d_max = 2", "'voltage_control.i_d_max' is no limit"),
         ("sg9.governor.V_MAX = 1", "there is no component 'sg9'"),
         ('sg1.governor.V_MAX = "1 MW"', "MW"),
     ):
