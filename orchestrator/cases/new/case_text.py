@@ -26,6 +26,7 @@ _STEPS = {"emt": "100 us", "phasor": "2 ms"}
 """Communication step that a new case has, by the kind of its models."""
 
 _MOST_CURVES = 12
+_MOST_REPLACED = 3  # units that a title names; the others are counted
 _MOST_MOVES = 5  # of taps and shunts that are named; the others are counted
 _EMF = (
     """emf w·e''; [conventions] like = "psse" takes PSS/E's e'', which moves dampings by tenths of a point, of """
@@ -89,6 +90,7 @@ class CaseText:
             called = "converter" if len(self._places) == 1 else p.name
             holding = f"at {p.bus} it holds the {p.v_pu:g} pu of the base"
             lines.append(f"{called}: {what}; {holding}; {_dispatch(p)}")
+        lines += [self._about_replacement(unit) for unit in self._wanted.replace]
         if "dyr" not in self._sources:
             lines.append(
                 "machines: no dynamics data, so all are a steam turbine's with exciter ST1: typical data"
@@ -119,6 +121,24 @@ class CaseText:
             lines.append(line + " (--details lists them)" * any(details(records)))
         more = f"{questions} question{'s' * (questions != 1)} about the data: comments at their lines in the file"
         return [*lines, more] if questions else lines
+
+    @property
+    def _replacements(self) -> str:
+        """Tell which converters of ours stand in place of machines of the files, as the end of a title."""
+        named = [f"gfor{unit} for unit {unit}" for unit in self._wanted.replace]
+        return f", but with our {few(named, _MOST_REPLACED)}" if named else ""
+
+    def _about_replacement(self, unit: str) -> str:
+        """Tell what a converter of ours replaces, and with how much power."""
+        name = f"gfor{unit}"
+        plan = self._base.system.components.get(name) if self._base else None
+        fed = ""
+        if plan is not None:
+            fed = f" and its {plan.number('P_0') * plan.number('S_n'):.5g} MW"
+        return (
+            f"{name}: our grid-forming converter with a droop replaces unit {unit}{fed}; the records of its dynamics "
+            "are not used"
+        )
 
     def _moves(self) -> str:
         """Tell which taps and shunts moved, and that they do after an outage."""
@@ -357,7 +377,8 @@ class CaseText:
     def _scenarios(self) -> list[list[str]]:
         devices = [x for place in self._places for x in (place.name, place.injection)]
         removed = [f"remove = {_toml_list(devices)}"] if devices else []
-        found = [["[scenarios.base]", 'title = "As in the files"', *removed]]
+        title = f"As in the files{self._replacements}"
+        found = [["[scenarios.base]", f"title = {_quoted(title)}", *removed]]
         if self._base is None or self._network is None:
             return [*found, self._fault()] if self._fault_bus else found
         if self._places:

@@ -373,6 +373,20 @@ def test_a_converter_can_replace_a_machine(files):
     assert compute_modes(converter).stability.stable
 
 
+def test_a_case_names_the_machines_that_a_converter_of_ours_replaces(files):
+    case, new = made(files, None, replace=("3",))
+    title = "As in the files, but with our gfor3 for unit 3"
+    assert case.table.scenarios["base"].title == title
+    assert "gfor3: our grid-forming converter with a droop replaces unit 3 and its 160 MW" in (
+        "".join(new.assumed)
+    )
+    (base,) = case.prepare(["base"])
+    assert {"gfor3", "sg2"} <= {*base.system.components}
+    assert "sg3" not in base.system.components
+    untouched, _ = made(files, None)
+    assert untouched.table.scenarios["base"].title == "As in the files"
+
+
 def test_without_dynamics_data_the_machines_are_typical_and_said(files):
     _, new = made(files[:1])
     assert "machines: no dynamics data" in "".join(new.assumed)
