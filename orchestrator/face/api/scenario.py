@@ -395,7 +395,8 @@ class Scenario(Unchanged):
         Parameters
         ----------
         inputs
-            Tunable parameters and open inputs; by default what the scenario's events change.
+            Tunable parameters and open inputs; by default what the scenario's events change, without what
+            switches, such as a fault.
         outputs
             Observed outputs; by default what the case plots.
         continuous
@@ -417,8 +418,14 @@ class Scenario(Unchanged):
         >>> model.B.shape == (len(model.states), 1)
         True
         """
-        from orchestrator.studies.modes.linear import default_inputs, default_outputs, linear_model  # noqa: PLC0415 - as above
+        from orchestrator.studies.modes.linear import (  # noqa: PLC0415 - as above
+            default_inputs,
+            default_outputs,
+            linear_model,
+            tell_left_out,
+        )
 
+        left_out = () if inputs else tell_left_out(self.prepared)
         inputs = names_given(inputs, "inputs") or default_inputs(self.prepared)
         outputs = names_given(outputs, "outputs") or default_outputs(self.prepared)
         for argument, chosen in (("inputs", inputs), ("outputs", outputs)):
@@ -438,7 +445,7 @@ class Scenario(Unchanged):
             **vars(model),
             operating_point=point,
             stability=examined.stability,
-            warnings=examined.warnings,
+            warnings=(*left_out, *examined.warnings),
             continuous_form=None
             if continuous or black_box
             else partial(self.linearize, inputs, outputs, continuous=True),

@@ -10,7 +10,7 @@ import numpy as np
 from orchestrator.cases.form.names import variables_of
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Matrix
-from orchestrator.core.errors import InputError
+from orchestrator.core.errors import InputError, few
 from orchestrator.core.late import xr
 from orchestrator.linear.doubts.examination import Examination, examine
 from orchestrator.linear.models.linear_model import LinearModel
@@ -20,20 +20,40 @@ from orchestrator.linear.models.state_space import StateSpace, state_space
 from orchestrator.linear.models.steady_state import OperatingPoint, find_operating_point
 from orchestrator.linear.spectra.stability import judge
 from orchestrator.studies.modes.modes import running
-from orchestrator.systems.coupling.events import faults_among
+from orchestrator.systems.coupling.events import Event, faults_among
 from orchestrator.systems.coupling.master import Master
 
 
 def default_inputs(prepared: PreparedScenario) -> list[str]:
-    """Return what the scenario's events change, as far as a linear model can be driven by it."""
+    """Return what the scenario's events change, as far as a linear model can be driven by it.
+
+    What an event sets beside a switch, such as a fault's reactance, has no effect before it."""
     changed = [
         f"{component}.{variable}"
         for event in prepared.events
+        if not _switches(event)
         for component, settings in event.changes().items()
-        for variable, value in settings.items()
-        if not isinstance(value, bool)
+        for variable in settings
     ]
     return list(dict.fromkeys(changed))
+
+
+def tell_left_out(prepared: PreparedScenario) -> tuple[str, ...]:
+    """Return a sentence where events of the scenario are no inputs by default, as they switch something."""
+    switching = [str(event) for event in prepared.events if _switches(event)]
+    if not switching:
+        return ()
+    return (
+        f"a linear model cannot follow what switches, so these events are no inputs: {few(switching, 2, '; ')}",
+    )
+
+
+def _switches(event: Event) -> bool:
+    return any(
+        isinstance(value, bool)
+        for settings in event.changes().values()
+        for value in settings.values()
+    )
 
 
 def default_outputs(prepared: PreparedScenario) -> list[str]:
@@ -128,12 +148,7 @@ def response_at_steady_state(prepared: PreparedScenario) -> xr.Dataset:
 
 def linear_response(master: Master, prepared: PreparedScenario) -> xr.Dataset:
     """Response of the linear step map to the scenario's events, at the recorded times and for all recorded signals."""
-    switching = [
-        str(event)
-        for event in prepared.events
-        for settings in event.changes().values()
-        if any(isinstance(value, bool) for value in settings.values())
-    ]
+    switching = [str(event) for event in prepared.events if _switches(event)]
     faults = faults_among(prepared.events)
     if faults:
         raise NoLinearResponseError(

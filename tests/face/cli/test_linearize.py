@@ -42,6 +42,16 @@ def test_the_files_hold_the_model_with_its_names(tmp_path, capsys):
     assert json.loads(content["provenance"])["scenario"] == "gfor"
 
 
+@pytest.mark.slow
+def test_a_fault_is_no_input_and_this_is_told(tmp_path, capsys):
+    """Its reactance has no effect before it begins, and the fault at no reactance is none."""
+    assert main(["export", "linear", "k2a", "--scenario", "pss", "--out", str(tmp_path)]) == 0
+    said = capsys.readouterr()
+    assert " 0 inputs, " in said.out
+    assert "these events are no inputs: t = " in said.err
+    assert "fault" in said.err.partition("these events are no inputs")[2]
+
+
 def test_the_exported_model_answers_as_the_simulation_does(tmp_path, capsys):
     folder = tmp_path / "out"
     code = main(
