@@ -1,6 +1,6 @@
 """A scenario in preparation: the case's tables, the results of the steps so far, and the problems found."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -127,6 +127,8 @@ class Draft:
     # relays of the labels of units, and of loads, by the records of dynamics data
     unit_relays: Sequence[tuple[str, UnitRelay]] = ()
     load_relays: Sequence[LoadRelay] = ()
+    # labels of the units that are wind turbines, by a record of dynamics data that may be left out
+    wind_turbines: Collection[str] = frozenset()
     # what the units fed before an outage that they share; None without one
     dispatch: Dispatch | None = None
     # voltages before an outage [pu], at which loads that follow the voltage draw what is set

@@ -195,8 +195,17 @@ def _high_sides(network: Network, units: Mapping[str, str]) -> dict[str, str]:
     return found
 
 
+def take_wind_turbines(draft: Draft, records: Sequence[DynamicRecord]) -> None:
+    """Give the draft the units that have a record of a wind turbine; one that the case leaves out counts as well."""
+    labels = unit_labels(draft.data.machines) if draft.data else {}
+    machines = {(record.bus, record.machine) for record in records if record.name.startswith(_WIND)}
+    draft.wind_turbines = {label for machine, label in labels.items() if machine in machines}
+
+
 def _is_wind(draft: Draft, name: str) -> bool:
-    """Return whether a plant has a record of a wind turbine."""
+    """Return whether a plant has, or its machine had, a record of a wind turbine."""
+    if name in {f"{kind}{label}" for kind in _UNIT_KINDS for label in draft.wind_turbines}:
+        return True
     records = draft.tables[name].records or ""
     return any(record.upper().startswith(_WIND) for record in records.split())
 

@@ -48,7 +48,11 @@ from orchestrator.cases.questions.plausibility import question
 from orchestrator.cases.scenario.dc_lines import dc_components, take_dc_lines
 from orchestrator.cases.scenario.motor_components import Motors, motor_components, take_motors
 from orchestrator.cases.scenario.plants_of_several import plant_components, take_plants
-from orchestrator.cases.scenario.protection_relays import TakenRelays, take_relays
+from orchestrator.cases.scenario.protection_relays import (
+    TakenRelays,
+    take_relays,
+    take_wind_turbines,
+)
 from orchestrator.cases.scenario.recorded_loads import take_frequency, take_laws
 from orchestrator.cases.scenario.removed_parts import without_removed_parts
 from orchestrator.core.errors import InputError, Problem, few
@@ -412,6 +416,7 @@ def _account(
         taken |= take_dc_lines(draft, table, wanted)
     with refusals.keep():
         relays = take_relays(draft, wanted)
+    take_wind_turbines(draft, [x for x in records if (x.bus, x.machine) not in ours])
     refusals.tell()
     taken |= relays.places
     uses = [

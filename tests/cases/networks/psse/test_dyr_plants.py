@@ -271,6 +271,15 @@ def test_a_code_gives_a_wind_plant_the_times_of_wind(records, shortest, told, pr
     assert min(x.limits.delay for x in ready.relays if x.limits.low == 0.25) == shortest
 
 
+@pytest.mark.parametrize("left_out", ["WTPTA1 WTTQA1", "WTDTA1 WTARA1 WTPTA1 WTTQA1"])
+def test_a_wind_plant_stays_one_where_its_turbine_is_left_out(left_out, prepared, tmp_path):
+    """A model without the turbine's shaft is still a wind plant, which may trip in half of the time of others."""
+    made = MADE["REGCA1 REECA1 WTDTA1 WTARA1 WTPTA1 WTTQA1"]
+    prepared(with_records(*made), f"dyr_leave_out = {left_out.split()}\n")
+    (ready,) = with_protection(load_case(tmp_path / "case.toml"), "prc029").prepare()
+    assert {relay.record for relay in ready.relays} == {"PRC-029 for wind"}
+
+
 @pytest.mark.parametrize("records", [name for name in MADE if "elsewhere" not in name])
 @pytest.mark.slow
 def test_the_system_with_such_a_plant_has_modes_and_a_run(records, prepared, tmp_path, gfor):
