@@ -59,7 +59,9 @@ def onset_of(times: Numbers, envelope: Numbers, half: int, frequency: float) -> 
             left = np.minimum(left, _left_over(z, steady, _seen(dying, window, moves)))
     best = int(np.argmin(left))
     samples = len(envelope) / (_INDEPENDENT * len(window))
-    good = np.flatnonzero(left <= left[best] * (1 + _MORE / samples))
+    # running sums of an envelope that a law explains wholly may leave less than nothing
+    least = max(left[best], np.finfo(float).eps * np.vdot(z, z).real)
+    good = np.flatnonzero(left <= least * (1 + _MORE / samples))
     margin = _LEAST / frequency
     found = float(times[0]) + step * begins
     return Onset(
