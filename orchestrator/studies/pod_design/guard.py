@@ -129,10 +129,12 @@ def extremes(model: LinearModel) -> tuple[complex, complex | None]:
     return weakest_and_growing(values, step_map=model.step_size is not None)
 
 
-def weakest_and_growing(values: Complex, *, step_map: bool) -> tuple[complex, complex | None]:
-    """The least damped eigenvalue from 0.1 to 2 Hz (−1 if no eigenvalue lies there), and the fastest growing one
+def weakest_and_growing(
+    values: Complex, *, step_map: bool, within: tuple[float, float] = ELECTROMECHANICAL_HZ
+) -> tuple[complex, complex | None]:
+    """The least damped eigenvalue of a range [Hz] (−1 if no eigenvalue lies there), and the fastest growing one
     [rad/s], of all eigenvalues."""
-    low, high = ELECTROMECHANICAL_HZ
+    low, high = within
     hertz = values.imag / (2 * np.pi)
     weakest = min(
         values[(hertz >= low) & (hertz <= high)].tolist(), key=damping_ratio, default=complex(-1)

@@ -2,7 +2,7 @@
 
 import cmath
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -58,12 +58,12 @@ class SearchEnd:
     """Why a search among gains chose none that is larger.
 
     ``bound``: the largest gain [pu] that was allowed.
-    ``next_gain``, ``next_least``: the next larger gain that was tried, and its least damping ratio; None for the
-    damping if something grows. Both are None if the largest gain was chosen."""
+    ``next_gain``, ``next_mode``: the next larger gain that was tried, and the least damped mode with it [rad/s]; None
+    for the mode if something grows. Both are None if the largest gain was chosen."""
 
     bound: float
     next_gain: float | None = None
-    next_least: float | None = None
+    next_mode: complex | None = None
 
 
 @dataclass(frozen=True)
@@ -212,7 +212,7 @@ def _with_pod(
     by_gain = shift(PodSetting(1.0, NO_COMPENSATION))
     if not by_gain:
         raise AnalysisError("a POD there does not move the mode at all")
-    looks = LeastDamping(loop, known)
+    looks = LeastDamping(loop, known, frequency_range)
     tuned, search = tuned_setting(loop, start, by_gain, eigenvalue, gain, looks=looks)
     trial = trial_of(tuned, by_gain, eigenvalue)
     predicted = shift(trial)
@@ -268,7 +268,7 @@ def tuned_setting(
         deciding = [max(settings, key=lambda one: worth[one]), best, *_next_larger(best, settings)]
         unsure = [one for one in dict.fromkeys(deciding) if not seen.is_sure(one)]
         if not unsure:
-            return best, _search_end(best, settings, worth, most)
+            return best, _search_end(best, settings, seen, most)
         worth |= {one: seen.surely(one) for one in unsure}
 
 
@@ -287,11 +287,11 @@ def _of_followed(loop: PodLoop, start: Placed, setting: PodSetting) -> float:
 
 
 def _search_end(
-    best: PodSetting, settings: Sequence[PodSetting], worth: Mapping[PodSetting, float], most: float
+    best: PodSetting, settings: Sequence[PodSetting], seen: LeastDamping, most: float
 ) -> SearchEnd:
     for following in _next_larger(best, settings):
-        least = worth[following]
-        return SearchEnd(most, following.gain, None if least <= GROWS else least)
+        grows = seen.of(following) <= GROWS
+        return SearchEnd(most, following.gain, None if grows else seen.weakest(following))
     return SearchEnd(most)
 
 

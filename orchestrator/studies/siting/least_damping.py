@@ -42,16 +42,26 @@ MOST_WHOLE = 3500
 class LeastDamping:
     """Least damping ratios by setting.
 
-    ``known``: modes of the system without the device, from which those with it are followed."""
+    ``known``: modes of the system without the device, from which those with it are followed.
+    ``frequency_range``: of the study [Hz]; the swings from 0.1 to 2 Hz count whatever it is."""
 
-    def __init__(self, loop: PodLoop, known: Sequence[Mode] = ()) -> None:
+    def __init__(
+        self,
+        loop: PodLoop,
+        known: Sequence[Mode] = (),
+        frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
+    ) -> None:
         self._loop, self._known = loop, known
+        low, high = zip(ELECTROMECHANICAL_HZ, frequency_range, strict=True)
+        self._within = min(low), max(high)
         self._swings: dict[PodSetting, RefinedModes | None] = {}
         self._whole: dict[PodSetting, NDArray[np.complex128]] = {}
         self._found: dict[PodSetting, float] = {}
 
     def of(self, setting: PodSetting) -> float:
-        """The least damping ratio from 0.1 to 2 Hz, `GROWS` where something is seen to grow."""
+        """The least damping ratio, `GROWS` where something is seen to grow.
+
+        Where swings are followed, it is that from 0.1 to 2 Hz; `surely` knows those of a wider range as well."""
         if setting not in self._found:
             model = self._loop.model(setting)
             swings = None if len(model.names) <= MOST_WHOLE else self._followed(setting)
@@ -63,11 +73,18 @@ class LeastDamping:
         return self._found[setting]
 
     def surely(self, setting: PodSetting) -> float:
-        """The same with growth at any frequency, by all eigenvalues."""
-        is_map = self._loop.model(setting).step_size is not None
-        weakest, growing = weakest_and_growing(self.all_values(setting), step_map=is_map)
-        self._found[setting] = GROWS if growing is not None else damping_ratio(weakest)
+        """The same in the whole range and with growth at any frequency, by all eigenvalues."""
+        weakest = self.weakest(setting)
+        self._found[setting] = GROWS if weakest is None else damping_ratio(weakest)
         return self._found[setting]
+
+    def weakest(self, setting: PodSetting) -> complex | None:
+        """The least damped mode [rad/s], by all eigenvalues; None where something grows."""
+        is_map = self._loop.model(setting).step_size is not None
+        weakest, growing = weakest_and_growing(
+            self.all_values(setting), step_map=is_map, within=self._within
+        )
+        return weakest if growing is None else None
 
     def is_sure(self, setting: PodSetting) -> bool:
         """Tell whether growth at any frequency is known, or that something grows."""

@@ -252,7 +252,7 @@ def _confirmed(result: MachineSites, machine: str, scenario: str) -> Confirmatio
             if not by_gain:
                 raise AnalysisError("a POD there does not move the mode at all")
             s = start.eigenvalue
-            looks = LeastDamping(loop)
+            looks = LeastDamping(loop, frequency_range=request.frequencies)
             tuned, search = tuned_setting(loop, start, by_gain, s, request.gain, looks=looks)
             turned = by_gain * tuned.filters.response(s)
             trial = trial_of(tuned, by_gain, s)

@@ -146,7 +146,7 @@ def answer_in_parts(result: SiteResult) -> tuple[str, str]:
         return _best_confirmed(result, among)
     others = ", ".join(f"{bus} {100 * result.least(bus)[0] / most:.0f} %" for bus in best[1:])
     tried = [one for one in result.confirmations if one.bus == best[0] and not one.failure]
-    then = "".join(f"; as it is now, {with_it(one)}" for one in tried)
+    then = "".join(f"{_doubt(one)}; as it is now, {with_it(one)}" for one in tried)
     moved = result.shifts[DEVICE][at][mode.label][best[0]]
     is_place = f"is the best place for {device_title(result)}{among}"
     if moved.hardly:
@@ -172,10 +172,18 @@ def _best_confirmed(result: SiteResult, among: str) -> tuple[str, str]:
     but = f", but {least_then(first, before)}" if lower else ""
     steps = f"{before:.2f} % → {first.damping:.2f} % for {title_of_mode(seen.label, seen.mode)}"
     return (
-        f"{first.bus} is the best place for {device_title(result)}{among}: {steps}{but}; {with_it(first)}",
+        f"{first.bus} is the best place for {device_title(result)}{among}: {steps}{_doubt(first)}{but}; "
+        f"{with_it(first)}",
         f"; the least damped mode without the device is {title_of_mode(seen.label, seen.mode)}. "
         f"With {_rated(result)}{pod} at the next best places it has {then}, as coupled FMUs say. "
         f"By {unit(result, '100')} the best are {small}",
+    )
+
+
+def _doubt(one: Confirmation) -> str:
+    """Tell of a place that coupled FMUs do not confirm; "" of one that they do."""
+    return (
+        "" if one.agrees else f" (NOT CONFIRMED: the prediction is off by {100 * one.error:.2g} %)"
     )
 
 
@@ -273,10 +281,11 @@ def end_of_search(one: Confirmation) -> str:
         return ""
     if one.search.next_gain is None:
         return ", the largest that --gain allows"
-    least = one.search.next_least
+    least = one.search.next_mode
     if least is None:
         return f"; with {one.search.next_gain:g} something grows"
-    return f"; with {one.search.next_gain:g} the least damped mode has {100 * least:.2f} %"
+    mode = f"{least.imag / math.tau:.3f} Hz, has {damping_percent(least):.2f} %"
+    return f"; with {one.search.next_gain:g} the least damped mode, {mode}"
 
 
 def least_then(one: Confirmation, before: float) -> str:

@@ -15,6 +15,7 @@ from orchestrator.studies.pod_design.lead_lag import NO_COMPENSATION
 from orchestrator.studies.siting import study
 from orchestrator.studies.siting.candidates import question_about, unit_terminals
 from orchestrator.studies.siting.confirmation import Confirmation, SearchEnd, tuned_setting
+from orchestrator.studies.siting.least_damping import LeastDamping
 from orchestrator.studies.siting.study import SiteRequest, find_sites
 from orchestrator.studies.siting.view import (
     Siting,
@@ -43,6 +44,11 @@ def eigenvalue(damping):
 
 OTHER = 11.0 * complex(-0.075, (1 - 0.075**2) ** 0.5)
 """The mode beside it [rad/s], of 7.5 %."""
+
+
+def swinging(w, damping_ratio):
+    """An eigenvalue of the size w [rad/s]."""
+    return w * complex(-damping_ratio, (1 - damping_ratio**2) ** 0.5)
 
 
 def least_damped(damping):
@@ -251,7 +257,12 @@ class Loop:
         (lambda K: 0.30, 200.0, 200.0, SearchEnd(200.0)),
         (lambda K: 0.02, 200.0, 200.0, SearchEnd(200.0)),  # nothing moves it
         (lambda K: 0.02 - 2e-6 * K, 200.0, 200.0, SearchEnd(200.0)),  # by 0.04 points it falls
-        (lambda K: 0.09 - 4e-4 * K, 200.0, 50.0, SearchEnd(200.0, 100.0, pytest.approx(0.05))),
+        (
+            lambda K: 0.09 - 4e-4 * K,
+            200.0,
+            50.0,
+            SearchEnd(200.0, 100.0, pytest.approx(swinging(3.6 * np.pi, 0.05))),
+        ),
         (lambda K: -0.01 if K > 60 else 0.09, 200.0, 50.0, SearchEnd(200.0, 100.0)),
     ],
 )
@@ -263,13 +274,53 @@ def test_gain_rises_until_damping_does_no_longer_or_its_bound_is_reached(other, 
     assert search == ended
 
 
+def test_a_swing_of_the_study_beyond_2_hz_bounds_the_gain():
+    """A mode of 2.2 Hz falls with the gain: it counts in a study to 3 Hz, and is what ends the search there."""
+
+    class FastLoop(Loop):
+        OTHER = 4.4 * np.pi
+
+    loop = FastLoop(lambda K: 0.09 - 4e-4 * K)
+    to_2_hz, to_3_hz = (
+        tuned_setting(
+            loop,
+            None,
+            complex(-1.0),
+            complex(0.0, Loop.SWING),
+            200.0,
+            looks=LeastDamping(loop, frequency_range=(0.1, high)),
+        )
+        for high in (2.0, 3.0)
+    )
+    assert to_2_hz[0].gain == 200.0
+    assert to_3_hz[0].gain == 50.0
+    expected = pytest.approx(swinging(FastLoop.OTHER, 0.05))
+    assert to_3_hz[1] == SearchEnd(200.0, 100.0, expected)
+
+
+def test_a_best_place_whose_prediction_is_off_is_not_called_best_without_saying_so(
+    five, monkeypatch
+):
+    """Whether it is the only place that coupled FMUs tried, or the best of several."""
+    for others in ({}, {"bus_12": (4.0, 7.30, True)}):
+        found = planted(monkeypatch, five, bus_11=(4.61, 8.13, True), **others)
+        assert "NOT CONFIRMED" not in answer(found)
+        first, *behind = found.confirmations
+        off = replace(first, predicted=1.08 * first.coupled)
+        (said, *_) = Siting(replace(found, confirmations=(off, *behind))).answer_lines
+        assert "(NOT CONFIRMED: the prediction is off by 8 %)" in said
+
+
 def test_what_ended_the_search_is_said(five, monkeypatch):
     found = planted(monkeypatch, five, bus_11=(4.61, 8.13, True))
     (one,) = found.confirmations
     tuned = replace(one, setting=PodSetting(100.0, NO_COMPENSATION))
     for search, words in (
         (SearchEnd(100.0), "(K 100 pu, the largest that --gain allows)"),
-        (SearchEnd(200.0, 200.0, 0.0711), "(K 100 pu; with 200 the least damped mode has 7.11 %)"),
+        (
+            SearchEnd(200.0, 200.0, swinging(Loop.OTHER, 0.0711)),
+            "(K 100 pu; with 200 the least damped mode, 1.795 Hz, has 7.11 %)",
+        ),
         (SearchEnd(200.0, 200.0), "(K 100 pu; with 200 something grows)"),
     ):
         ended = replace(found, confirmations=(replace(tuned, search=search),))
