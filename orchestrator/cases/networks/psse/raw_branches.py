@@ -1,6 +1,7 @@
 """Lines, switching devices and transformers of a PSS/E RAW file."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import count
 
@@ -14,13 +15,16 @@ from orchestrator.cases.networks.psse.raw_records import (
 from orchestrator.cases.networks.psse.raw_tables import BUS_COLUMNS, RawTables, is_in_service
 from orchestrator.cases.networks.psse.transformers import Transformer, star, transformers
 from orchestrator.cases.networks.source_changes import Remark
+from orchestrator.core.errors import few
 
 _SBASE = 100.0  # usual base [MVA]
 _FAR = 20.0
 """Times the middle one of all reactances of lines from which one is questioned, where its ohms would be usual."""
 
-# step of shifts in radians, and how near a number is to be one of them
-_RADIANS, _NEAR = math.pi / 6, 0.01
+_STEP = math.pi / 6  # of usual shifts [rad]
+_ROUNDED = 0.005  # by which a shift of two decimals is beside the one that is meant
+_SPREAD = 3.0  # standard deviations by which more shifts than by chance are multiples of a step
+_ANGLES_SHOWN = 3  # shifts that a question names; the others are counted
 _SAME_VOLTAGE = 0.1  # part by which the nominal voltages at a line's ends may differ
 
 
@@ -136,9 +140,32 @@ def _circuit(net: RawTables, record: Record, pair: frozenset[int]) -> str:
 
 
 def read_transformers(net: RawTables) -> None:
-    for t in transformers(net.raw, net.kilovolts):
+    found = list(transformers(net.raw, net.kilovolts))
+    _question_radians(net, found)
+    for t in found:
         moved = tuple(replace(w, bus=net.same.get(w.bus, w.bus)) for w in t.windings)
         _add_transformer(net, replace(t, windings=moved))
+
+
+def _question_radians(net: RawTables, found: Sequence[Transformer]) -> None:
+    """Ask, once, about shifts that would be usual ones in radians, if more are than by chance."""
+    small = [
+        (t.record.line, winding.shift)
+        for t in found
+        for winding in t.windings
+        if _ROUNDED < abs(winding.shift) < 2 * math.pi
+    ]
+    usual = {line: shift for line, shift in small if abs(math.remainder(shift, _STEP)) <= _ROUNDED}
+    chance = 2 * _ROUNDED / _STEP
+    expected = len(small) * chance
+    if len(usual) <= expected + _SPREAD * math.sqrt(expected * (1 - chance)):
+        return
+    shown = few([f"{shift:g}" for shift in dict.fromkeys(usual.values())], _ANGLES_SHOWN)
+    turns = dict.fromkeys(30 * round(shift / _STEP) for shift in usual.values())
+    degrees = few(map(str, turns), _ANGLES_SHOWN)
+    for line in usual:
+        text = f"ANG is {shown} degrees: is it in radians? {degrees} degrees are usual"
+        net.changes.note(line, text)
 
 
 def _add_transformer(net: RawTables, t: Transformer) -> None:
@@ -148,10 +175,6 @@ def _add_transformer(net: RawTables, t: Transformer) -> None:
     if not all(w.has_ratio for w in windings):
         text = "WINDV is 0, which MATPOWER writes where a ratio is not given: the nominal ratio is taken"
         net.changes.note(t.record.line, text)
-    for turned in (w.shift / _RADIANS for w in windings if 0 < abs(w.shift) < 2 * math.pi):
-        if abs(turned - round(turned)) < _NEAR * abs(turned):
-            text = f"ANG is {turned * _RADIANS:g} degrees: is it in radians? {round(turned) * 30} degrees are usual"
-            net.changes.note(t.record.line, text)
     if t.small_loss:
         text = "R below 1 is a load loss in W by CZ = 3, as good as none: is it in pu, so that CZ = 2 is right?"
         net.changes.note(t.record.line, text)

@@ -361,6 +361,34 @@ def test_an_honest_file_is_asked_about_nothing(questions):
     assert questions() == []
 
 
+def with_shifts(*shifts):
+    """The file with transformers beside line 5-1, of no current as good as none, with these shifts [degrees]."""
+    end = "0 / END OF TRANSFORMER DATA"
+    beside = "".join(
+        f" 5,  1, 0, 'A{k}', 1, 2, 1, 0.0, 0.0, 2, 'T{k}', 1\n0.0, 5000, 900.0\n"
+        f"1.0, 230.0, {shift}, 0.0, 0.0, 0.0, 0, 0, 1.1, 0.9, 1.02, 0.98, 33\n1.0, 20.0\n"
+        for k, shift in enumerate(shifts, start=10)
+    )
+    return changed(RAW, (end, beside + end))
+
+
+def about_radians(asked):
+    return [str(question) for question in asked if "radians" in str(question)]
+
+
+SPREAD = [round(-0.79 - 0.0323 * k, 2) for k in range(40)]
+"""Shifts of a real network's kind [degrees], of which -1.05 and -1.57 are multiples of 30 degrees by chance."""
+
+
+def test_shifts_that_are_usual_in_radians_by_chance_are_not_asked_about(questions):
+    assert about_radians(questions(raw=with_shifts(*SPREAD))) == []
+
+
+def test_shifts_in_radians_are_asked_about_once(questions):
+    (asked,) = about_radians(questions(raw=with_shifts(0.52, -0.52, 1.05, 0.52, 2.62)))
+    assert "is it in radians? 30, -30, 60 and 1 more degrees are usual" in asked
+
+
 def test_an_answer_is_taken(questions):
     meant = 'meant = ["sg3.exciter", "sg3.governor"]\n'
     assert questions(dyr=without("EXST1", 3), case=meant + CASE) == []
