@@ -58,9 +58,10 @@ def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError
                 ". Give others more of the power (P_0 of units; a screening of outages shares it by itself), lower the "
                 "loads or the reactive power around it, or correct a limit that is wrong in its data"
             )
-        grid = prepared.system.components.get(prepared.grid)
-        fed = feeding_loads(prepared.network, grid, plan.number("S_n"))
-        text += f"; {fed}" if fed else ""
+        if _share(plan) <= 1:  # a load below zero leaves a unit less active power, never more
+            grid = prepared.system.components.get(prepared.grid)
+            fed = feeding_loads(prepared.network, grid, plan.number("S_n"))
+            text += f"; {fed}" if fed else ""
     # The same values are refused again by a model of ours; an FMU of others may lack a licence today.
     kind = ErrorKind.START if is_ours(plan.description.path) else ErrorKind.FMU
     return StartError(prepared.case.source, Problem(prepared.places[name], text, kind), name)

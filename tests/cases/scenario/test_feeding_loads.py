@@ -69,6 +69,14 @@ def test_a_unit_that_cannot_start_names_the_load(prepared):
         running(in_service(scenario)).close()
 
 
+def test_a_unit_that_is_asked_for_too_much_by_itself_does_not_name_the_load(prepared):
+    """The converter's own P_0 is too large: a load below zero leaves a unit less, never more."""
+    scenario = prepared(-400, d2=1500, **{"vsc.P_0": 1.5})
+    with pytest.raises(CosimError, match=r"vsc .*cannot start") as failure:
+        running(in_service(scenario)).close()
+    assert "below zero" not in str(failure.value)
+
+
 def test_all_units_that_cannot_start_are_told_together(tmp_path):
     """One of 1.5 pu at each bus with a converter; what to do about it stands with the first."""
     unit = CASE[CASE.index("[components.vsc]") :]
