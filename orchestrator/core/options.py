@@ -113,6 +113,7 @@ class Option(Spelling, Enum):
     SCR = "scr"
     SENSITIVITIES = "sensitivities", ALONE
     SET = "set", "values"
+    SHARING = "sharing"
     SIGN = "sign"
     SIGNERS = "signers"
     SLACK = "slack", ALONE

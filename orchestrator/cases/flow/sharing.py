@@ -8,6 +8,7 @@ from enum import StrEnum
 from fmus.toolchain.port_variables import LARGEST_POWER
 from orchestrator.cases.flow.power_flow import FlowUnit, PowerFlow
 from orchestrator.core.errors import ErrorKind, InputError
+from orchestrator.core.options import Option
 from orchestrator.systems.coupling.system import ComponentPlan
 
 _CLOSE = 1e-6  # power [MW] that may be left to the units at the slack bus beside their share
@@ -207,11 +208,17 @@ def _overload(reserves: Sequence[Reserve], change: float, left: str) -> str:
         first = f"{worst.name} would need {need:.4g} MW, where its most is {worst.most:.4g} MW"
     else:
         first = f"{worst.name} would have to go down to {need:.4g} MW"
-    return (
-        f"{first}: {abs(change):.4g} MW {'more' if change > 0 else 'less'} cannot be shared, {left} "
-        "are left when all units with a governor or a droop are at their limits; give another dispatch, or lose load "
-        "with the unit (unit+load)"
+    more, short = ("more", "short") if change > 0 else ("less", "too much")
+    text = (
+        f"{first}: {abs(change):.4g} MW {more} cannot be shared, {left} are {short} when all units with a governor or "
+        "a droop are at their limits; "
     )
+    if change > 0 and all(one.most <= 0 for one in able):
+        return text + (
+            "no unit may feed anything: if PT in the RAW file or P_MAX of the governors is not meant so, correct it, "
+            "or let the slack alone feed what is lost (" + Option.SHARING + " slack)"
+        )
+    return text + "give another dispatch, or lose load with the unit (unit+load)"
 
 
 def shared_flow(

@@ -89,10 +89,20 @@ def test_shares_follow_the_gains_until_a_limit():
 
 
 def test_units_without_room_are_told_in_megawatts():
-    """A file with PT = 0 of all machines: no share of 0 MW is told."""
+    """A file with PT = 0 of all machines: no share of 0 MW is told, and who feeds what is lost all the same."""
     words = "a would need 56.67 MW, where its most is 0 MW: 20 MW more cannot be shared, 20 MW are"
-    with pytest.raises(InputError, match=re.escape(words)):
+    with pytest.raises(InputError, match=re.escape(words)) as caught:
         shares([Reserve("a", 50, 1, 0, 0), Reserve("b", 9, 2, 0, 0)], 20)
+    assert "let the slack alone feed what is lost (--sharing slack)" in str(caught.value)
+
+
+def test_what_cannot_be_shared_is_told_as_a_deficit_or_a_surplus():
+    """Of 60 MW more than 50 + 50 MW, 20 MW are short; of 120 MW less than those 100 MW, 20 MW are too much."""
+    units = [Reserve(name, 50, 1, 0, 70) for name in "ab"]
+    for change, words in ((60, "20 MW are short when all"), (-120, "20 MW are too much when all")):
+        with pytest.raises(InputError, match=words) as caught:
+            shares(units, change)
+        assert "--sharing" not in str(caught.value)
 
 
 def test_a_units_droop_and_limits_are_those_of_its_model(five):
