@@ -110,7 +110,8 @@ def _refuse_what_lacks(
     bare = [key for key in unmodelled if key not in accounted]
     places = {(record.bus, record.machine) for record in strange}
     problems = found.problems
-    if min(len(places), len(bare)) >= LEAST_STRANGE:
+    known = sum(record.name in RECORDS_OF_UNITS for record in records)
+    if min(len(places), len(bare)) >= LEAST_STRANGE and 2 * len(strange) > known:
         problems = [other_network(strange, records, bare, len(found.machines)), *problems]
         strange = []
         accounted |= {*bare}

@@ -39,6 +39,15 @@ def test_files_of_two_networks_are_one_problem(tmp_path, machines, records, plac
     assert "has no record of a machine" not in said
 
 
+def test_files_of_one_network_with_records_at_other_buses_are_told_by_machine(tmp_path):
+    """Most records have a machine, so the files belong together: each machine without a record can be mended."""
+    said = renumbered(tmp_path, {4, 5})
+    assert "do not belong together" not in said
+    assert "the RAW file does not have GENROU of machine '1' at bus 104, " in said
+    for bus in (4, 5):
+        assert f"machine '1' at bus {bus} has no record of a machine; add one, or write" in said
+
+
 def test_a_slip_at_one_machine_names_its_records(tmp_path):
     said = renumbered(tmp_path, {4})
     assert "do not belong together" not in said
