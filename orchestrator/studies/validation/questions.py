@@ -26,6 +26,7 @@ class QuestionKind(StrEnum):
     SLOW_SAMPLES = "slow samples"
     DOUBT_UNKNOWN = "doubt unknown"
     MISSING = "missing samples"
+    MISSING_CODE = "code for missing"
     FILLED = "filled samples"
     UNMEASURED = "P or Q missing"
     GAP_AT_EVENT = "gap at the event"
@@ -56,6 +57,7 @@ class QuestionKind(StrEnum):
 FIGURES_HOLD = {
     QuestionKind.BASES_ASSUMED,
     QuestionKind.MISSING,
+    QuestionKind.MISSING_CODE,
     QuestionKind.FILLED,
     QuestionKind.SLOW_SAMPLES,
     QuestionKind.NOISE,

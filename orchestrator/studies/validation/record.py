@@ -26,6 +26,7 @@ from orchestrator.studies.validation.channels import RecordedChannel, channels_i
 from orchestrator.studies.validation.clipped import clipped_run
 from orchestrator.studies.validation.filled import Mask, filled_samples, held_alone, runs_of
 from orchestrator.studies.validation.held_power import held_power
+from orchestrator.studies.validation.missing_codes import without_codes
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.stored_twice import stored_twice
 from orchestrator.studies.validation.transformer import AT_PORT, Between, Beyond
@@ -169,7 +170,9 @@ def read_recording(
     if "places" in dataset.attrs and not given:
         dataset, place = _of_run(dataset, place, label), None
     channels = channels_in(dataset, place, given, label)
+    dataset, of_codes = without_codes(dataset, channels)
     reading = _Reading(dataset, label, bases, channels)
+    reading.questions += of_codes
     reading.ask_of_samples()
     voltage, power = reading.voltage(), reading.power()
     return _evened(reading, voltage, power)

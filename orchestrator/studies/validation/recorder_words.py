@@ -143,6 +143,15 @@ def _missing(x: Figures) -> str:
     )
 
 
+def _missing_code(x: Figures) -> str:
+    rows = "row" if x["count"] == 1 else "rows"
+    return (
+        f"{x['column']!r} is {x['value']:.10g} at {x['at']:g} s ({x['count']} {rows}), far from all its other values: "
+        "a code for missing? These samples are taken as missing. Leave the cells empty if it is, or give another "
+        "column, with " + _channel(f"{x['role']}=COLUMN")
+    )
+
+
 def _unmeasured(x: Figures) -> str:
     return (
         f"P or Q is missing for {x['length']:.3g} s from {x['at']:.4g} s on, where the voltage is known: what the "
@@ -287,6 +296,7 @@ RECORDER_SENTENCES: Mapping[QuestionKind, Sentence] = {
     QuestionKind.TIME_UNIT: _time_unit,
     QuestionKind.SLOW_SAMPLES: _slow_samples,
     QuestionKind.MISSING: _missing,
+    QuestionKind.MISSING_CODE: _missing_code,
     QuestionKind.UNMEASURED: _unmeasured,
     QuestionKind.FILLED: _filled,
     QuestionKind.GAP_AT_EVENT: _gap_at_event,
