@@ -107,16 +107,19 @@ def _time_remedy(times: Numbers) -> str:
 def _table(path: Path) -> pd.DataFrame:
     """Names, and rows of numbers where a column has nothing else."""
     if path.suffix.lower() in EXCEL:
-        mark, (names, rows) = "", _parted(_sheet(path))
+        mark, cells = "", _sheet(path)
+        names, rows = _parted(cells)
     else:
         try:
             text = _text(read_bytes(path, MOST_TEXT))
             for mark in [*(mark for mark in ";\t" if mark in text), ","]:
-                names, rows = _parted(list(csv.reader(io.StringIO(text), delimiter=mark)))
+                cells = list(csv.reader(io.StringIO(text), delimiter=mark))
+                names, rows = _parted(cells)
                 if rows:
                     break
         except (OSError, csv.Error) as error:
             raise InputError(f"{path}: it cannot be read as CSV: {error}") from error
+    _check_heading_once(path, cells, rows)
     odd = next((row for row in rows if len(row) != len(names)), None)
     if odd:
         both = "the comma both parts the columns and stands in the numbers: write decimal points, or ';' between them"
@@ -131,6 +134,15 @@ def _table(path: Path) -> pd.DataFrame:
         dtype=str,
     )
     return texts.apply(lambda column: _numbers(column, comma=mark != ","))
+
+
+def _check_heading_once(path: Path, cells: Sequence[list[str]], rows: Sequence[list[str]]) -> None:
+    """Refuse a heading that comes again among the numbers, as in files that were joined."""
+    begin = next((k for k, row in enumerate(cells) if rows and row is rows[0]), len(cells))
+    heads = [row for row in cells[:begin] if row][-2:]  # names, and units below them
+    again = next((k for k in range(begin, len(cells)) if cells[k] in heads), None)
+    if again is not None:
+        raise InputError(f"{path}: row {again + 1} repeats the heading; remove that row")
 
 
 def _numbers(column: pd.Series[Any], *, comma: bool) -> pd.Series[Any]:

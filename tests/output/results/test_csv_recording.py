@@ -109,6 +109,8 @@ def test_what_is_no_table_over_the_time_is_refused_in_own_words(tmp_path):
         ("time,f\n1.5,2\n", "give at least two rows"),
         ("time,f\n1.51,2\n,7\n1.53,3\n", "row 2 of the numbers has no time"),
         ("time,f,f\n1.51,2,4\n1.52,3,4\n", "several columns have the name 'f'"),
+        ("time,f\n0.01,2\ntime,f\n0.02,3\n", "row 3 repeats the heading; remove that row"),
+        ("PMU 7\n\nt,f\ns,Hz\n0.01,2\n\ns,Hz\n0.02,3\n", "row 7 repeats the heading"),
         ("time,f\n1,2\n2,3,4,5\n", "and '2,3,4,5' has 4; name them all"),
         (
             "time,f\n0,00,50,1\n0,02,50,2\n",
