@@ -35,6 +35,8 @@ _THOUSANDS = r"[-+]?\d{1,3}(?:[.,'\s]\d{3})+(?:[.,]\d+)?"
 _DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}([T\s].*)?|\d{1,2}:\d{2}(:.*)?")
 _TIME = re.compile(rf"\s*([-+]?\d*[.,]?\d+([eE][-+]?\d+)?|{_DATE.pattern})\s*")
 _SAMPLED = 0.045  # times farther apart [s] are slower than phasors are usually sent: perhaps ms
+_SLOWEST_FRAMES = 0.105  # and still are seconds up to here [s], ten phasors a second, in files
+_LENGTHS_OF_FRAMES = 1.0, 200.0  # of such a length [s]: as many ms hold no swing
 _AGAIN = " "  # behind a name for each time that it came before: columns of a table differ
 _EPOCH = 1e8  # numbers of seconds above it count from 1970, and are taken from the first sample on
 
@@ -63,7 +65,8 @@ def read_table(path: Path) -> xr.Dataset:
             f"{path}: the time of its {len(times)} rows does not rise from each row to the next; {_time_remedy(times)}"
         )
     apart = float(np.median(np.diff(times)))
-    if stamps is None and not unit and (apart > _SAMPLED or kind == "i"):
+    is_unclear = kind == "i" or (apart > _SAMPLED and not _are_slow_frames(apart, times))
+    if stamps is None and not unit and is_unclear:
         raise InputError(
             f"{path}: its times are {apart:g} apart, perhaps in ms, and {first!r} says no unit; "
             f"write '{first} [s]' or '{first} [ms]'"
@@ -86,6 +89,12 @@ def read_table(path: Path) -> xr.Dataset:
     }
     times = np.round(times - times[0], 6) if times[0] > _EPOCH else times
     return xr.Dataset(columns, {"time": times, LINE_FREQUENCY: 0.0})
+
+
+def _are_slow_frames(apart: float, times: Numbers) -> bool:
+    """Return whether times without a unit are seconds of a recorder that sends ten to twenty phasors a second."""
+    shortest, longest = _LENGTHS_OF_FRAMES
+    return apart <= _SLOWEST_FRAMES and shortest <= times[-1] - times[0] <= longest
 
 
 def _time_remedy(times: Numbers) -> str:

@@ -98,6 +98,23 @@ def test_times_whole_seconds_apart_are_taken_where_their_unit_is_said(tmp_path):
     assert read_table(path)["time"].values.tolist() == [0, 20]
 
 
+@pytest.mark.parametrize("frames", [10, 16, 20, 25])
+def test_phasors_sent_ten_times_a_second_are_in_seconds(tmp_path, frames):
+    path = tmp_path / "slow.csv"
+    times = np.arange(10 * frames + 1) / frames
+    path.write_text("\n".join(["time,f", *(f"{t:.6g},50.01" for t in times), ""]))
+    assert read_table(path)["time"].values == pytest.approx(times, abs=1e-6)
+
+
+@pytest.mark.parametrize(("apart", "length"), [(0.05, 400.0), (0.1, 0.5), (0.2, 20.0)])
+def test_times_that_may_be_milliseconds_are_asked_about(tmp_path, apart, length):
+    path = tmp_path / "fast.csv"
+    times = np.arange(0.0, length, apart)
+    path.write_text("\n".join(["time,f", *(f"{t:.6g},50.01" for t in times), ""]))
+    with pytest.raises(InputError, match=r"perhaps in ms, and 'time' says no unit"):
+        read_table(path)
+
+
 def test_what_is_no_table_over_the_time_is_refused_in_own_words(tmp_path):
     path = tmp_path / "ring.csv"
     for text, words in (
