@@ -378,6 +378,8 @@ def _growth_elsewhere(one: Mapping[str, Any]) -> str:
     hertz = found["frequency_hz"]
     at = f"at {hertz:.4g} Hz" if hertz else "without an oscillation"
     states = ", ".join(f"{row['state']} {row['factor']:.2f}" for row in found["participation"][:4])
+    if found["common_speed"]:
+        states = f"all machines alike: {', '.join(found['common_speed'][:4])}"
     return (
         f"the mode that grows fastest is outside of the listed frequencies: {fastest:+.3g} 1/s {at}; "
         f"in it take part {states}"

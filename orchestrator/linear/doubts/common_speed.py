@@ -4,6 +4,7 @@ Where no governor acts, nothing holds the frequency: its eigenvalue is zero if m
 change with speed, and slightly beside zero if they do. No machine leaves another in such a mode."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.linear.spectra.stability import Stability
@@ -48,18 +49,18 @@ def _last(state: str) -> str:
     return state.rpartition(".")[2]
 
 
-def tell_common_speed(stability: Stability, speeds: Sequence[str]) -> tuple[str, ...]:
-    """Return a sentence where the fastest growing mode is the drift of the common speed.
-
-    Parameters
-    ----------
-    stability
-        The verdict with its mode.
-    speeds
-        States that are the machines' speeds.
-    """
+def name_common_speed(stability: Stability, speeds: Sequence[str]) -> Stability:
+    """Return a verdict with the machines' ``speeds`` where the fastest growing mode is their common drift."""
     mode = stability.mode
     if stability.stable is not False or mode is None or not is_common_speed(mode, speeds):
+        return stability
+    return replace(stability, common_speed=tuple(speeds))
+
+
+def tell_common_speed(stability: Stability) -> tuple[str, ...]:
+    """Return a sentence where a verdict has the name of the common speed; see `name_common_speed`."""
+    mode = stability.mode
+    if mode is None or not stability.common_speed:
         return ()
     others = stability.growing - 1
     beside = f"{others} more grow, more slowly" if others else "nothing else grows"

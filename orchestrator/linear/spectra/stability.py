@@ -151,6 +151,8 @@ class Stability(NoTruth):
         Communication step [s]; None of a continuous model.
     reason
         Why the verdict is not known, or which region was not searched.
+    common_speed
+        The machines' speeds where what grows fastest is the drift of all of them alike; none otherwise.
 
     Examples
     --------
@@ -173,6 +175,12 @@ class Stability(NoTruth):
     continuous_growth_rate: float | None = None
     step_size: float | None = None  # communication step [s]; None for a continuous model
     reason: str = ""  # why the verdict is not known, or the region that was not searched
+    common_speed: tuple[str, ...] = ()  # the machines' speeds where they drift alike
+
+    @property
+    def only_common_speed(self) -> bool:
+        """Return whether the drift of the common speed is all that grows, so that every swing is damped."""
+        return bool(self.common_speed) and self.growing == 1
 
     @property
     def largest_growth_rate(self) -> float | None:
@@ -208,7 +216,11 @@ class Stability(NoTruth):
     def growth(self, mode: Mode) -> str:
         """How fast a growing ``mode`` grows, who takes part in it, and how many modes grow."""
         more = f"; {self.growing} modes grow" if self.growing > 1 else ""
-        return f"a mode grows at {self._where(mode)}{more}"
+        if not self.common_speed:
+            return f"a mode grows at {self._where(mode)}{more}"
+        swings = "every swing is damped, and " if self.only_common_speed else ""
+        speeds = few(self.common_speed, _STATES_NAMED)
+        return f"{swings}the common speed drifts at {mode.eigenvalue.real:+.4g} 1/s without a governor ({speeds}){more}"
 
     def _where(self, mode: Mode) -> str:
         states = ", ".join(
@@ -236,6 +248,7 @@ class Stability(NoTruth):
             "frequency_hz": None if mode is None else mode.frequency_hz,
             "participation": participation,
             "growing_modes": self.growing,
+            "common_speed": list(self.common_speed),
             "zero_eigenvalues": self.zeros,
             "eigenvalues": self.eigenvalues,
             "cause": None if self.cause is None else str(self.cause),

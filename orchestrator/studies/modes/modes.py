@@ -22,7 +22,7 @@ from orchestrator.cases.scenario.service import in_service
 from orchestrator.core.errors import ComponentError
 from orchestrator.core.threads import side_by_side
 from orchestrator.devices.binding.misfits import Misfit
-from orchestrator.linear.doubts.common_speed import tell_common_speed
+from orchestrator.linear.doubts.common_speed import name_common_speed, tell_common_speed
 from orchestrator.linear.doubts.examination import examine
 from orchestrator.linear.doubts.excitation_limiters import limiter_warnings
 from orchestrator.linear.doubts.external_exciters import settled_warnings, start_warnings
@@ -397,6 +397,7 @@ class Linearised:
             for misfit in found
         ]
         speeds = tuple(matching(model.names, analysis.swing))
+        stability = name_common_speed(examined.stability, speeds)
         eigenvalues: Sequence[complex] = ()
         outside = None
         if spectrum is not None:
@@ -423,13 +424,13 @@ class Linearised:
                 *self._said,
                 *map(str, prepared.questions),
                 *examined.warnings,
-                *tell_common_speed(examined.stability, speeds),
+                *tell_common_speed(stability),
                 *naming.doubts,
                 *(f"{fault}: the modes are those before it" for fault in failing),
             ),
             swing=speeds,
             areas=areas_of(analysis.areas, prepared.system) or prepared.areas_of_units,
-            stability=examined.stability.doubted(misfits),
+            stability=stability.doubted(misfits),
             hidden=outside,
             system=self._system,
             eigenvalues=eigenvalues,

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-from orchestrator.linear.doubts.common_speed import is_common_speed
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.linear.spectra.stability import Cause
 from orchestrator.output.report.short_texts import first_few
@@ -50,6 +49,10 @@ def _remark(result: ModesResult, mode: Mode | None) -> str:
         return swing if result.misfits else verdict.reason
     if verdict.stable or verdict.mode is None:
         return swing
+    if verdict.only_common_speed:
+        rate = verdict.mode.eigenvalue.real
+        drift = f"swings damped; the common speed drifts ({rate:+.2g} 1/s, no governor)"
+        return f"{drift}; {swing}" if swing else drift
     place = _outside(result, verdict.mode)
     who = _who_grows(result, verdict.mode) if place else ""
     because = "; cause: the coupling" if verdict.cause is Cause.COUPLING else ""
@@ -62,7 +65,7 @@ def _remark(result: ModesResult, mode: Mode | None) -> str:
 
 
 def _who_grows(result: ModesResult, growing: Mode) -> str:
-    if is_common_speed(growing, result.swing):
+    if result.stability.common_speed:
         return ": the common speed"
     return f": {growing.participation[0][0]}" if growing.participation else ""
 

@@ -1,9 +1,15 @@
 """The drift of the common speed, by two machines whose eigenvalues are known: one is told, another growth is not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from orchestrator.linear.doubts.common_speed import is_common_speed, tell_common_speed
+from orchestrator.linear.doubts.common_speed import (
+    is_common_speed,
+    name_common_speed,
+    tell_common_speed,
+)
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.stability import judge
 from orchestrator.studies.modes.modes import compute_modes
@@ -13,6 +19,10 @@ from tests.support.scenarios import prepare_one
 SPEEDS = ("sg1.omega", "sg2.omega")
 INERTIA = 5.0
 """H of both machines [s]."""
+
+
+def told_of(verdict):
+    return tell_common_speed(name_common_speed(verdict, SPEEDS))
 
 
 def two_machines(synchronising, falling, apart=0.0):
@@ -35,7 +45,7 @@ def test_a_torque_that_falls_with_speed_is_told_as_the_common_speed():
     """Its eigenvalue is d/(2H)."""
     verdict = judge(two_machines(synchronising=1.0, falling=0.4))
     assert verdict.mode.eigenvalue == pytest.approx(0.04, rel=1e-6)
-    (told,) = tell_common_speed(verdict, SPEEDS)
+    (told,) = told_of(verdict)
     assert "+0.04 1/s is the common speed" in told
 
 
@@ -45,7 +55,7 @@ def test_machines_that_lose_each_other_are_not_told_so():
     rate = np.sqrt(2 * 0.001 * 2 * np.pi * 50 / (2 * INERTIA))
     assert verdict.mode.eigenvalue == pytest.approx(rate, rel=1e-6)
     assert rate < 0.5
-    assert tell_common_speed(verdict, SPEEDS) == ()
+    assert told_of(verdict) == ()
 
 
 def with_governor(gate):
@@ -64,7 +74,7 @@ def test_a_governor_that_acts_is_not_passed_over(gate, told):
     """At rest within its dead band it moves by nothing, and the drift is that without a governor."""
     verdict = judge(with_governor(gate))
     assert verdict.stable is False
-    assert bool(tell_common_speed(verdict, SPEEDS)) is told
+    assert bool(told_of(verdict)) is told
 
 
 @pytest.mark.parametrize(("synchronising", "told"), [(0.0001, False), (1.0, True)])
@@ -77,7 +87,7 @@ def test_speeds_alike_do_not_hide_angles_that_part(synchronising, told):
     )
     first, second = (verdict.mode.shape[speed].real for speed in SPEEDS)
     assert abs(first - second) < 0.02 * abs(first)
-    assert bool(tell_common_speed(verdict, SPEEDS)) is told
+    assert bool(told_of(verdict)) is told
 
 
 @pytest.mark.slow
@@ -95,16 +105,34 @@ def test_a_line_near_its_limit_is_not_told_as_a_drift():
 def test_a_drift_without_a_governor_is_told(case, scenario):
     result = compute_modes(prepare_one(case, scenario))
     assert any("No governor acts here" in text for text in result.warnings)
+    answer = of_modes(result)
+    assert (answer.good, answer.verdict) == (False, "UNSTABLE")
+    assert answer.remark.startswith("swings damped; the common speed drifts (+0.0")
+    assert answer.remark.count("no governor") == 1
+
+
+def test_a_verdict_names_the_speeds_and_stays_one_of_growth():
+    """A swing that grows besides is not called damped."""
+    verdict = name_common_speed(judge(two_machines(1.0, 0.4, apart=-1.0)), SPEEDS)
+    assert verdict.sentence().startswith(
+        "UNSTABLE: every swing is damped, and the common speed drifts at +0.04 1/s without a governor "
+        "(sg1.omega, sg2.omega); cause: the system"
+    )
+    assert verdict.as_json()["stable"] is False
+    besides = replace(verdict, growing=2)
+    assert not besides.only_common_speed
+    assert "damped" not in besides.sentence()
+    assert "2 modes grow" in besides.sentence()
 
 
 def test_a_swing_that_grows_and_a_stable_system_are_silent():
-    assert tell_common_speed(judge(two_machines(1.0, 0.4)), SPEEDS)
+    assert told_of(judge(two_machines(1.0, 0.4)))
     for falling in (-0.4, 0.0):
-        assert tell_common_speed(judge(two_machines(1.0, falling)), SPEEDS) == ()
+        assert told_of(judge(two_machines(1.0, falling))) == ()
     growing = judge(two_machines(1.0, -0.4, apart=1.6))
     assert growing.stable is False
     assert growing.mode.is_oscillation
-    assert tell_common_speed(growing, SPEEDS) == ()
+    assert told_of(growing) == ()
 
 
 def test_one_machine_has_no_common_speed():
