@@ -12,6 +12,7 @@ from contextlib import contextmanager
 import pytest
 
 import orchestrator as gfor
+from orchestrator.cases.case import load_case
 from orchestrator.face.cli import main
 from orchestrator.face.explore.opened import opened as opened_folder
 from orchestrator.face.explore.server import Explorer
@@ -158,6 +159,27 @@ def test_map_table_and_verdict_are_those_of_the_command(view, capsys):
 
 
 @needs_chromium
+def test_a_scenario_is_compared_with_the_one_that_differs_least_besides_the_converter(
+    browser, two_area
+):
+    """Kundur's first scenario without a converter has another exciter as well."""
+    view = browser.new_page()
+    view.goto(two_area.address)
+    computed(view, 1)
+    tables = load_case("kundur").table.scenarios
+    systems = {name: table.model_dump_json() for name, table in tables.items()}
+    compared = """systems => {
+        Object.assign(seen, { systems, titles: systems }); state.scenario = "pod_q";
+        return [converterApart(), differencesOf(converterApart(), "pod_q")];
+    }"""
+    assert view.evaluate(compared, systems) == [
+        "thyristor",
+        ["units.alpha.1", "gfor1.pod_q.enabled"],
+    ]
+    view.close()
+
+
+@needs_chromium
 def test_the_first_screen_has_the_answer_its_shape_five_sliders_and_a_response(browser, two_area):
     context = browser.new_context(viewport={"width": 1440, "height": 900})
     view = context.new_page()
@@ -174,6 +196,7 @@ def test_the_first_screen_has_the_answer_its_shape_five_sliders_and_a_response(b
     assert gain.locator(".effect").inner_text().startswith("+20 pu → −0.46 points of damping")
     view.locator("#questions button", has_text="converter").click()
     view.locator("#else-said", has_text="Base (only SG): UNSTABLE").wait_for()
+    assert "They differ by gfor, grid.load_2.P, " in view.locator("#else-said").inner_text()
     view.locator("#questions button", has_text="twice as long").click()
     view.locator("#else-said", has_text="Now: stable").wait_for()
     view.locator("#questions button", has_text="gives 10 %").click()

@@ -129,11 +129,24 @@ async function searchWith(name, percent) {
   const now = leastOf(seen.modes), here = now && percent !== null ? `now ${fixed(now.damping_percent, 2)} % at ${number(state.values[name] ?? original(name))}; ` : "";
   sayElse(`${name}: ${here}${one.said.innerText.replaceAll("\nalso ", "; also ").replaceAll(" set", "").split("\n")[0]} `, show ? button : "");
 }
+// What two scenarios of the case set otherwise: components that one of them removes, files of parameters, and values.
+function differencesOf(one, other) {
+  const [a, b] = [one, other].map(name => JSON.parse(seen.systems[name])), without = (list, those) => list.filter(entry => !those.includes(entry));
+  const listed = ["remove", "parameters"].flatMap(kind => [...without(a[kind], b[kind]), ...without(b[kind], a[kind])]);
+  return [...listed, ...Object.keys({ ...a.set, ...b.set }).filter(name => a.set[name] !== b.set[name])];
+}
+// The scenario that has no converter where this one has one, or has one where this one has none, and differs least in the rest.
+function converterApart() {
+  if (!seen.systems?.[state.scenario]) return undefined;
+  const converters = name => { const one = JSON.parse(seen.systems[name]); return String([...one.remove, "and", ...Object.keys(one.set).filter(key => key.startsWith("units.alpha."))]); };
+  const apart = Object.keys(seen.titles).filter(name => converters(name) !== converters(state.scenario)), count = name => differencesOf(name, state.scenario).length;
+  return apart.sort((a, b) => count(a) - count(b))[0];
+}
 async function withoutConverter(other) {
   sayElse(`${seen.titles[other]}: being computed …`);
   const error = make("span"), found = await ask("comparison", { ask: "modes", ...theCase(), scenario: other, values: {}, events: null, range: state.range }, error);
   if (found === undefined) return;
-  sayElse(found ? `${seen.titles[other]}: ${swingOf(found)}. ${titleNow()}: ${swingOf(seen.answer)}.` : `${seen.titles[other]}: ${reasonOf(error.textContent)}`);
+  sayElse(found ? `${seen.titles[other]}: ${swingOf(found)}. ${titleNow()}: ${swingOf(seen.answer)}. They differ by ${differencesOf(other, state.scenario).join(", ")}.` : `${seen.titles[other]}: ${reasonOf(error.textContent)}`);
 }
 function whatAModeIs() {
   const m = seen.modes[chosenIndex()] ?? leastOf(seen.modes), z = m ? m.damping_percent / 100 : 0, left = Math.exp(-2 * Math.PI * z / Math.sqrt(Math.max(1e-9, 1 - z * z)));
@@ -144,7 +157,7 @@ function paintQuestions() {
   const movers = seen.moversOf === state.scenario ? seen.movers?.movers ?? [] : [], first = (movers.find(one => one.parameter.startsWith("grid.")) ?? movers[0])?.parameter, all = seen.info?.parameters ?? [];
   const gains = all.filter(p => /(^|\.)K$/.test(p.parameter) && p.variability === "tunable" && p.value), gain = gains.find(p => p.switches.every(one => (state.values[one] ?? original(one)) !== false)) ?? gains[0];
   const line = SAVED ? null : lineToLose(), long = seen.info?.diagram?.lines.find(l => l.length && original(l.length));
-  const other = Object.keys(seen.titles).find(name => seen.systems?.[name] !== seen.systems?.[state.scenario]), off = gain?.switches[0], questions = [];
+  const other = converterApart(), off = gain?.switches[0], questions = [];
   const add = (text, act) => { const button = make("button", {}, text); button.addEventListener("click", act); questions.push(button, " "); };
   if (!SAVED && line) add(`What if line ${line.name} is out?`, () => withValues({ [line.open]: false }, `Without line ${line.name}`));
   else if (!SAVED && long) add(`What if line ${long.name} were twice as long?`, () => withValues(Object.fromEntries([long.length, long.resistance, long.charging].filter(n => n && parameterOf(n) && original(n)).map(n => [n, 2 * (state.values[n] ?? original(n))])), `Line ${long.name}, twice as long`));
