@@ -361,6 +361,15 @@ def test_an_honest_file_is_asked_about_nothing(questions):
     assert questions() == []
 
 
+def test_a_gate_and_water_that_no_plant_has_are_asked_about(questions):
+    """HYGOV as some public files have it for every machine: T_g = 20.5 s, T_w = 15 s."""
+    assert questions(dyr=changed(DYR, (TGOV1, HYGOV))) == []
+    placeholder = HYGOV.replace("0.05 0.5 0.2 1.0 0.0 1.0", "0.05 20.5 0.2 1.0 0.0 15.0")
+    asked = questions(dyr=changed(DYR, (TGOV1, placeholder)))
+    for told in ("T_g = 20.5", "T_W = 15"):
+        assert any(told in question for question in asked), asked
+
+
 def with_shifts(*shifts):
     """The file with transformers beside line 5-1, of no current as good as none, with these shifts [degrees]."""
     end = "0 / END OF TRANSFORMER DATA"
