@@ -81,7 +81,7 @@ def read_either_way(governor: Governor) -> Governor:
 
 require_within = partial(
     require_between,
-    rule="so the turbine cannot give its power; change the limit, the rating S_n, or the generator's active power",
+    rule="so the turbine cannot give its power; change the limit or the generator's active power",
 )
 
 

@@ -49,11 +49,13 @@ def limits_to_widen(prepared: PreparedScenario) -> list[WidenedLimit]:
         limit
         for name, plan in in_service(prepared).system.components.items()
         if plan.kind == "machine" and is_ours(plan.description.path)
-        for limit in _limits_of_machine(name, plan)
+        for limit in limits_of_machine(name, plan)
     ]
 
 
-def _limits_of_machine(name: str, plan: ComponentPlan) -> list[WidenedLimit]:
+def limits_of_machine(name: str, plan: ComponentPlan) -> list[WidenedLimit]:
+    """Find the limits for which one machine of ours cannot start, in the order of its parameters; see above."""
+
     def starts(values: dict[str, float]) -> bool:
         trial = replace(plan, parameters=plan.parameters | values)
         return refusal_to_start(name, trial) is None

@@ -1,9 +1,12 @@
 """Messages of a component that cannot start, in the words of the case: its place, its operating point, the remedy."""
 
 from orchestrator.cases.flow.sharing import power_limits
+from orchestrator.cases.new.widened_limits import limits_of_machine
 from orchestrator.cases.scenario.feeding_loads import feeding_loads
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import ComponentError, ErrorKind, Problem, StartError
+from orchestrator.core.options import Option
+from orchestrator.core.spelling import Text
 from orchestrator.devices.fmi.instance import is_ours
 from orchestrator.devices.fmi.refused_calls import refuses_to_start
 from orchestrator.systems.coupling.coupled import refusal_to_start
@@ -33,7 +36,11 @@ def start_errors(prepared: PreparedScenario, error: ComponentError) -> StartErro
     ours = [name for name in units if is_ours(prepared.system.components[name].description.path)]
     refused = {name: refusal_to_start(name, prepared.system.components[name]) for name in ours}
     others = [
-        Problem(prepared.places[name], _text(prepared, refusal, name), ErrorKind.START)
+        Problem(
+            prepared.places[name],
+            _text(prepared, refusal, name) + _wider_limits(name, prepared.system.components[name]),
+            ErrorKind.START,
+        )
         for name, refusal in refused.items()
         if refusal is not None and refuses_to_start(refusal) and name in prepared.places
     ]
@@ -62,9 +69,21 @@ def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError
             grid = prepared.system.components.get(prepared.grid)
             fed = feeding_loads(prepared.network, grid, plan.number("S_n"))
             text += f"; {fed}" if fed else ""
+    text += _wider_limits(name, plan)
     # The same values are refused again by a model of ours; an FMU of others may lack a licence today.
     kind = ErrorKind.START if is_ours(plan.description.path) else ErrorKind.FMU
     return StartError(prepared.case.source, Problem(prepared.places[name], text, kind), name)
+
+
+def _wider_limits(name: str, plan: ComponentPlan) -> str:
+    """Return what lets a machine of ours start with wider limits of its exciter and governor, as it is typed."""
+    if plan.kind != "machine" or not is_ours(plan.description.path):
+        return ""
+    found = limits_of_machine(name, plan)
+    typed = Text("; it starts with" if found else "")
+    for limit in found:
+        typed += " " + Option.SET + f" {limit.name}={limit.taken:g}"
+    return typed
 
 
 def _share(plan: ComponentPlan) -> float:

@@ -135,6 +135,16 @@ def test_a_point_beyond_a_widened_limit_is_refused(closed):
         running(beyond)
 
 
+def test_a_refused_start_names_values_with_which_every_machine_starts(tmp_path):
+    path = new_case(tmp_path, highest=0.3, widen_limits=False)
+    with pytest.raises(StartError, match=r"sg1 .*cannot start: governor\.V_MAX") as refused:
+        running(prepare_one(path, "base"))
+    typed = dict(re.findall(r"--set (\S+)=([\d.]+)", str(refused.value)))
+    assert {*typed} == {f"sg{n}.governor.V_MAX" for n in DROOPS}
+    assert "S_n, or" not in str(refused.value), "P_0 is in parts of it, so another does not help"
+    running(prepare_one(path, "base", typed)).close()
+
+
 def test_the_scenario_with_a_converter_starts_with_the_limits_of_the_base(tmp_path):
     path = new_case(tmp_path, highest=0.3, converters=["bus 13, 100 MVA, 60 MW, less sg3"])
     assert {*widened(path)} == {f"sg{n}.governor.V_MAX" for n in DROOPS}
