@@ -85,6 +85,17 @@ def test_a_motor_that_stalls_is_told_with_its_time_and_power(run):
     assert of_run(result).remark.startswith(f"motors that stall: motor2_1 at {told.time:.4g} s")
 
 
+def test_a_motor_that_is_on_its_way_to_a_stall_at_the_end_is_told(run):
+    """Planted: the run ends while it turns above half of its speed; the longer one shows that it stands still."""
+    (told,) = stalls(run(fault(0.5, X=0.0), stop=1.8, records=[with_torque(0)]))
+    assert 0.5 < told.figures["speed_at_the_end_pu"] < 0.7
+    assert "its speed falls below 0.7 pu" in told.message
+    assert "pu and falling at the end" in told.message
+    (later,) = stalls(run(fault(0.5, X=0.0), stop=3.0, records=[with_torque(0)]))
+    assert later.figures["speed_at_the_end_pu"] == pytest.approx(0.0, abs=1e-3)
+    assert stalls(run(fault(0.3, X=0.0), stop=1.8, records=[with_torque(0)])) == []
+
+
 @pytest.mark.parametrize(("duration", "VI"), [(0.1, 0.0), (1.5, 0.8)])
 def test_a_motor_that_recovers_or_is_off_does_not_stall(duration, VI, run):
     assert stalls(run(fault(duration, X=0.0), stop=4.0, records=[with_torque(0, VI)])) == []
