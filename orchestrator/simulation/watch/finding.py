@@ -9,6 +9,7 @@ Kind = Literal[
     "growing_oscillation",
     "sustained_oscillation",
     "run_away",
+    "excursion",
     "undisturbed_motion",
     "active_limit",
     "loss_of_synchronism",
@@ -35,6 +36,9 @@ UNSTABLE: frozenset[Kind] = frozenset(
 )
 """Kinds of finding that a stable system cannot give. ``not_judged`` is a remark: noise hides what there may
 be, or the run ends too early after an event; ``misfit`` is of a device and its binding, whatever the run does."""
+
+EXCURSION: Kind = "excursion"
+"""Kind of finding of a speed that left what grid codes allow for longer than they let it, and came back."""
 
 MISFIT: Kind = "misfit"
 

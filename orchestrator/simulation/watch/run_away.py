@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Numbers
-from orchestrator.simulation.watch.finding import Finding
+from orchestrator.simulation.watch.finding import EXCURSION, NOT_JUDGED, Finding
 from orchestrator.simulation.watch.seen import Seen, shown_name, unit
 from orchestrator.simulation.watch.settings import Settings
 from orchestrator.simulation.watch.stretches import Stretch
@@ -26,6 +26,10 @@ BAND = (0.9, 1.1)
 OUTSIDE = 1.0
 """A frequency is reported if it is outside of its band for longer than this in all [s]. A deep dip may push a rotor
 there for a short time."""
+
+BACK = 1.0
+"""Time at a run's end [s] that a frequency is inside of its band without a break to be back: as long as it may be
+outside."""
 
 # the same for a frequency outside without a break until the end [s]; none outside of `BAND`
 OUTSIDE_AT_END = 0.2
@@ -123,6 +127,8 @@ def run_away(
 ) -> Iterator[Finding]:
     """At most one speed outside of its band or drifting, and one drifting voltage: those that go farthest.
 
+    A speed that was outside and came back does not run away: it had an excursion.
+
     ``slipped``: whether units lost synchronism. In this case a speed must be outside of `BAND` at the end to be
     reported."""
     speeds = list(_speeds(seen, system, settings))
@@ -164,16 +170,80 @@ def _farthest(
         if drifting is not None or outside is not None:
             far = float(np.abs(course.signal - course.signal[0])[course.on].max()) / course.least
             found.append((far, course, drifting, outside))
-    if found:
-        _, course, drifting, outside = max(found, key=lambda f: f[0])
-        yield _finding(times, course, drifting, outside, unit(course.name, system), len(found) - 1)
+    away = [f for f in found if f[2] is not None or not _is_inside_at_end(times, f[1])]
+    if away:
+        _, course, drifting, outside = max(away, key=lambda f: f[0])
+        yield _finding(times, course, drifting, outside, unit(course.name, system), len(away) - 1)
+    elif found:
+        _, course, _, _ = max(found, key=lambda f: f[0])
+        yield _excursion(times, course, len(found) - 1)
+
+
+def _beyond_allowed(course: _Course) -> NDArray[np.bool_]:
+    """The looks at which a unit on the grid has a speed outside of `ALLOWED`."""
+    return course.on & _beyond(course.signal / _rated(course.signal), ALLOWED)
+
+
+def _last_look(course: _Course) -> int:
+    """Row of a unit's last look on the grid."""
+    return int(np.flatnonzero(course.on)[-1])
+
+
+def _is_inside_at_end(times: Numbers, course: _Course) -> bool:
+    """Tell whether a speed is inside of its band for the last looks on the grid, so that none swings through it."""
+    last = _last_look(course)
+    late = (times > times[last] - OUTSIDE_AT_END) & (times <= times[last])
+    return not _beyond_allowed(course)[late].any()
+
+
+def _leaves_again(times: Numbers, course: _Course) -> bool:
+    """Tell whether a speed moves away from the rated one to the end, by more than a steady deviation."""
+    last = _last_look(course)
+    before = int(np.searchsorted(times, times[last] - BACK))
+    rated = _rated(course.signal)
+    then, now = (abs(course.signal[row] / rated - 1) for row in (before, last))
+    return bool(now - then > LEAST_AWAY)
+
+
+def _excursion(times: Numbers, course: _Course, others: int) -> Finding:
+    """A speed that came back; one that did so just before the end, or leaves again, is not judged."""
+    outside, last = np.flatnonzero(_beyond_allowed(course)), _last_look(course)
+    begin, back = float(times[outside[0]]), float(times[outside[-1] + 1])
+    distance = np.abs(course.signal[outside] - _rated(course.signal))
+    farthest = outside[int(distance.argmax())]
+    value, lasts = float(course.signal[farthest]), len(outside) * float(times[1] - times[0])
+    do = "does" if others == 1 else "do"
+    also = f", as {do} {others} more" if others else ""
+    message = (
+        f"{course.name} leaves {ALLOWED[0]:g} to {ALLOWED[1]:g} pu at t = {begin:.4g} s{also}, goes as far as "
+        f"{value:.4g} pu at t = {times[farthest]:.4g} s, and is back from t = {back:.4g} s on, after {lasts:.3g} s "
+        f"outside in all; it is {course.signal[last]:.4g} pu at t = {times[last]:.4g} s"
+    )
+    enough = 0.0
+    if last == len(times) - 1:
+        leaves = _leaves_again(times, course)
+        message += " and moves away again" if leaves else ""
+        enough = float(times[last]) + LONG if leaves else back + BACK
+    is_back = enough <= times[last]
+    if not is_back:
+        message = f"whether the frequency settles is not judged: {message}; let the run go on to t = {enough:.4g} s"
+    component, _, variable = course.name.partition(".")
+    return Finding(
+        EXCURSION if is_back else NOT_JUDGED,
+        begin,
+        component=component,
+        variable=variable,
+        message=message,
+        until=back,
+        figures={"value": value, "outside_s": lasts},
+    )
 
 
 def _outside(times: Numbers, course: _Course, allowed: float) -> float | None:
     far = course.on & _beyond(course.signal / course.signal[0], BAND)
     if np.isinf(allowed):  # it slips
         return float(times[int(np.argmax(far))]) if far[-1] else None
-    outside = course.on & _beyond(course.signal / _rated(course.signal), ALLOWED)
+    outside = _beyond_allowed(course)
     interval = float(times[1] - times[0])
     at_end = len(outside) if outside.all() else int(np.argmin(outside[::-1]))
     if not far[-1] and at_end * interval < OUTSIDE_AT_END and outside.sum() * interval <= allowed:

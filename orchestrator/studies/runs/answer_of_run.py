@@ -9,7 +9,15 @@ from orchestrator.core.errors import RunInterruptedError, few
 from orchestrator.core.options import Option
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.simulation.watch.confirmation import PERIODS
-from orchestrator.simulation.watch.finding import INTERRUPTION, LIMIT, STALL, TRIP, Finding, Kind
+from orchestrator.simulation.watch.finding import (
+    EXCURSION,
+    INTERRUPTION,
+    LIMIT,
+    STALL,
+    TRIP,
+    Finding,
+    Kind,
+)
 from orchestrator.simulation.watch.own_trips import OWN_TRIPS
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.runs.after_events import lasting_changes, same_mode
@@ -71,7 +79,7 @@ def _with_limits(answer: ScenarioAnswer, result: RunResult) -> ScenarioAnswer:
 
 
 def _with_trips(answer: ScenarioAnswer, result: RunResult) -> ScenarioAnswer:
-    """Return the answer with who was tripped, stalled or interrupted, before all else that it remarks."""
+    """Return the answer with who was tripped, stalled, interrupted or far off, before all else that it remarks."""
     by_relays = [f"{trip.relay.of} at {trip.time:.4g} s" for trip in result.trips]
     inside = [one for one in _of_kind(result, TRIP) if one.variable in OWN_TRIPS]
     told = [
@@ -80,6 +88,7 @@ def _with_trips(answer: ScenarioAnswer, result: RunResult) -> ScenarioAnswer:
             ("relays trip", by_relays),
             ("own trips of", _who_and_when(inside)),
             ("motors that stall:", _who_and_when(_of_kind(result, STALL))),
+            ("a speed leaves its band and comes back:", _who_and_when(_of_kind(result, EXCURSION))),
             (
                 "DC lines that are blocked or bypassed:",
                 _who_and_when(_of_kind(result, INTERRUPTION)),

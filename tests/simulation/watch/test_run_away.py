@@ -67,8 +67,51 @@ def test_a_speed_that_comes_to_rest_far_away_is_told():
     assert finding.time == pytest.approx(EVENT + 0.5 * np.log(4 / 3), abs=0.01)
     assert finding.figures["value"] == pytest.approx(0.8)
     assert "it leaves 0.95 to 1.03 pu" in finding.message
-    (finding,) = found(lambda t: 1 + 0.2 * (t > 5) * (t < 7))
-    assert "is 1 pu at t = 20 s" in finding.message
+
+
+def hump(t, begin, end, depth):
+    """A speed that goes away and comes back, as half of a sine, and is 1 pu before and behind."""
+    return 1 - depth * np.sin(np.pi * (np.clip(t, begin, end) - begin) / (end - begin))
+
+
+def test_a_speed_that_comes_back_had_an_excursion_and_does_not_run_away():
+    """0.902 pu and back at rest with 5e-8 pu/s was called unstable."""
+    (finding,) = found(lambda t: hump(t, 1.0, 7.0, 0.098))
+    assert (finding.kind, finding.variable) == ("excursion", "omega")
+    crosses = 6.0 / np.pi * np.arcsin(0.05 / 0.098)
+    assert finding.time == pytest.approx(1.0 + crosses, abs=0.01)
+    assert finding.until == pytest.approx(7.0 - crosses, abs=0.01)
+    assert finding.figures["value"] == pytest.approx(0.902, abs=1e-4)
+    assert finding.figures["outside_s"] == pytest.approx(6.0 - 2 * crosses, abs=0.02)
+    assert "as does 1 more" in finding.message
+    assert finding.message.endswith("it is 1 pu at t = 20 s")
+
+
+def test_a_speed_that_has_just_come_back_is_not_judged_and_one_that_goes_again_runs_away():
+    (finding,) = found(lambda t: hump(t, 1.0, 7.0, 0.098), stop=6.5)
+    assert finding.kind == "not_judged"
+    assert "whether the frequency settles is not judged" in finding.message
+    assert "is back from t =" in finding.message
+    again = lambda t: hump(t, 1.0, 5.0, 0.098) - 0.05 * np.maximum(t - 7.0, 0)  # noqa: E731
+    assert [f.kind for f in found(again, stop=8.5)] == ["run_away"]
+    once_more = lambda t: hump(t, 1.0, 5.0, 0.098) - 0.04 * np.maximum(t - 7.0, 0)  # noqa: E731
+    (finding,) = found(once_more, stop=8.0)
+    assert finding.kind == "not_judged"
+    assert "is 0.96 pu at t = 8 s and moves away again; let the run go on" in finding.message
+
+
+@pytest.mark.parametrize(("trips_at", "kind"), [(4.0, "run_away"), (8.0, "excursion")])
+def test_a_unit_that_left_the_grid_far_off_did_not_come_back(trips_at, kind):
+    trip = ParameterChange(trips_at, "b", "connected", value=False)
+    (finding,) = found(lambda t: 1 + 0 * t, b=lambda t: hump(t, 1.0, 7.0, 0.098), events=[trip])
+    assert (finding.kind, finding.component) == (kind, "b")
+
+
+def test_a_machine_that_runs_away_is_told_and_not_those_that_come_back():
+    falls = lambda t: 1 + 0.05 * since(t)  # noqa: E731
+    kinds = [f.kind for f in found(lambda t: hump(t, 1.0, 7.0, 0.098), b=falls, stop=8.0)]
+    assert "excursion" not in kinds
+    assert set(kinds) & {"run_away", "loss_of_synchronism"}
 
 
 @pytest.mark.parametrize("late", [15.0, 19.8])

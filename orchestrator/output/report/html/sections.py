@@ -31,6 +31,7 @@ _KINDS = {
     "growing_oscillation": "growing oscillation",
     "sustained_oscillation": "sustained oscillation",
     "run_away": "run-away",
+    "excursion": "a speed leaves its band and comes back",
     "active_limit": "active limit",
     "loss_of_synchronism": "loss of synchronism",
     "not_judged": "not judged",
