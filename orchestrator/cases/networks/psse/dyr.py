@@ -37,7 +37,7 @@ from orchestrator.cases.networks.psse.parts_of_machines import MachineKey, Parts
 from orchestrator.cases.networks.psse.plant_points import measured_points
 from orchestrator.cases.networks.psse.raw_network import Machine
 from orchestrator.core.errors import InputError, first_of
-from orchestrator.core.options import Option
+from orchestrator.core.options import Option, command
 
 _MOST_SHOWN = 20
 
@@ -123,8 +123,10 @@ def _refuse_what_lacks(
     listed = first_of(counted_once, _MOST_SHOWN, ("gfor new lists all with " + Option.DETAILS))
     shown = [*in_words(missing, found.labels), *listed]
     raise InputError(
-        "the dynamics data cannot be taken over; correct them, or name models that may go in [units] "
-        "dyr_leave_out:\n  " + "\n  ".join(shown)
+        "the dynamics data cannot be taken over; correct them, or name models that may go in [units] dyr_leave_out ("
+        + command("new", (Option.DYR_LEAVE_OUT, "MODEL"))
+        + "):\n  "
+        + "\n  ".join(shown)
     )
 
 
