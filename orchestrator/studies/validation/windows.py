@@ -13,6 +13,7 @@ from orchestrator.studies.validation.filled import Mask
 from orchestrator.studies.validation.record import Recording
 
 _LAG = 0.02  # time [s] over which a change of the voltage counts as abrupt: a period
+_AS_USUAL = 2.0  # times the largest change in the first part, up to which a change is as before
 _LEAST = 0.002  # smallest change of the voltage [pu] over that time which is an event
 _ABOVE = 4.0  # times the largest change in the first part, from which on it is an event
 _FIRST = 0.1  # part of the recording that is looked at for what is usual before the event
@@ -115,7 +116,7 @@ def _event(recording: Recording, still: Complex, first: int) -> tuple[float, flo
     if not len(abrupt):
         return None
     earliest = max(0, int(abrupt[0]) + lag - round(_BACK / recording.interval))
-    return _begin_and_end(recording, still, earliest, int(abrupt[0]) + lag)
+    return _begin_and_end(recording, still, earliest, int(abrupt[0]) + lag, usual)
 
 
 def _early_event(
@@ -135,7 +136,7 @@ def _early_event(
     if not len(begins):
         return None
     steady = int(begins[0]) + lag  # samples that took part in the changes before
-    return _begin_and_end(recording, still, steady, steady + 2 * lag)
+    return _begin_and_end(recording, still, steady, steady + 2 * lag, float(before[begins[0]]))
 
 
 def _slow_event(recording: Recording, still: Complex, first: int) -> tuple[float, float] | None:
@@ -191,12 +192,14 @@ def _changes(still: Complex, lag: int) -> Numbers:
 
 
 def _begin_and_end(
-    recording: Recording, still: Complex, earliest: int, stop: int
+    recording: Recording, still: Complex, earliest: int, stop: int, usual: float
 ) -> tuple[float, float]:
-    """Begin between two samples, and the end [s]."""
+    """Begin between two samples, and the end [s]; ``usual``: the largest change over the lag before the event."""
     lag, interval = _lag(recording), recording.interval
     change = np.abs(still[lag:] - still[:-lag])
     begin = _begin(still, earliest, stop)
+    if _scatter(still[: max(earliest, 3)]) > usual:
+        begin = max(begin, _abrupt_begin(change, stop, lag, usual))
     if stop - begin > _GROWS * lag:
         is_seen = begin > max(earliest, 1)  # else it is further back
         low = begin - round((_LATE if is_seen else _BACK) / interval)
@@ -214,18 +217,30 @@ def _without_slope(signal: Complex, first: int) -> Complex:
     return np.asarray(signal * np.exp(-1j * turns * np.arange(len(signal))))
 
 
+def _scatter(before: Complex) -> float:
+    return float(np.abs(before - before.mean()).std())
+
+
 def _begin(still: Complex, earliest: int, stop: int) -> int:
     """The last sample that is as before, walking back from an abrupt change."""
     before = still[: max(earliest, 3)]
-    rest, scatter = (
-        before[-min(len(before), 200) :].mean(),
-        float(np.abs(before - before.mean()).std()),
-    )
-    least = max(_STARTS * scatter, _LEAST_STARTS)
+    rest = before[-min(len(before), 200) :].mean()
+    least = max(_STARTS * _scatter(before), _LEAST_STARTS)
     for k in range(stop, earliest, -1):
         if abs(still[k] - rest) <= least:
             return k
     return max(earliest, 1)
+
+
+def _abrupt_begin(change: Numbers, stop: int, lag: int, usual: float) -> int:
+    """The last sample up to which the signal changes as before, where it changes abruptly soon after; else the first.
+
+    Of a signal that wanders by more than it changes in a lag, as an angle does: it is nowhere where it was on average.
+    Without that, a slow begin is told by where the signal was."""
+    most = max(_AS_USUAL * usual, _LASTS * float(change[stop - lag]))
+    as_before = np.flatnonzero(change[: stop - lag + 1] <= most) + lag
+    last = int(as_before[-1]) if len(as_before) else 0
+    return last if stop - last <= _GROWS * lag else 0
 
 
 def _end(still: Complex, begin: int, change: Numbers, lag: int, interval: float) -> int:

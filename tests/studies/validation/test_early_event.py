@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.signal import lfilter
 
 from orchestrator.studies.validation.record import PortBases, read_recording
 from orchestrator.studies.validation.windows import find_windows
@@ -98,3 +99,27 @@ def test_a_slow_or_small_event_is_found_where_it_begins(name, interval, noise):
     found = windows(voltage, interval, noise=noise, length=12.0)
     assert found.seen
     assert found.begin == pytest.approx(begin, abs=0.1 if noise > 1e-4 else 0.05)
+
+
+def wandering(times, seed, hertz=0.005, corner=0.2):
+    """An angle [rad] whose frequency scatters as the loads of a grid make it, slower than a corner [Hz]."""
+    interval = times[1] - times[0]
+    kept = np.exp(-2 * np.pi * corner * interval)
+    pushes = hertz * np.sqrt(1 - kept**2) * np.random.default_rng(seed).standard_normal(len(times))
+    frequency = lfilter([1.0], [1.0, -kept], pushes)
+    return 2 * np.pi * np.cumsum(frequency) * interval
+
+
+@pytest.mark.parametrize("hertz", [0.005, 0.02])
+@pytest.mark.parametrize("interval", [1e-3, 0.02])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_dip_begins_where_it_does_though_the_angle_wanders(seed, interval, hertz):
+    """The angle is nowhere before the dip where it was on average."""
+
+    def voltage(times):
+        deep = (times >= 3.0 - 1e-9) & (times < 3.15)
+        return (1 - 0.1 * deep) * np.exp(1j * wandering(times, seed, hertz))
+
+    found = windows(voltage, interval, length=12.0)
+    assert found.seen
+    assert found.begin == pytest.approx(3.0, abs=1.1 * interval)
