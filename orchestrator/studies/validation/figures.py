@@ -5,7 +5,7 @@ per unit of the rating, its largest magnitude, its mean, and the mean of its mag
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,6 +26,9 @@ SIGNALS = ("p", "q", "i_p", "i_q")
 ModePair = tuple[IdentifiedMode | None, IdentifiedMode | None]
 """A mode of the measured signal and the same one of the simulated; None where there is none."""
 
+ModeLists = tuple[Sequence[IdentifiedMode], Sequence[IdentifiedMode]]
+"""Modes of the measured and of the simulated signal."""
+
 Identify = Callable[..., list[IdentifiedMode]]
 """Modes of a signal, strongest first, at an ``order``."""
 
@@ -41,6 +44,7 @@ _OTHER_LOOKS = ((0.03, 0), (0.06, 0), (0.0, -2), (0.0, 2))
 """Other looks at a ring-down, to see what they change: the part left out at its begin, and how many exponentials more
 the model has, as an oscillation takes two."""
 _LAST = 0.03  # part of a ring-down at its end that is left out, where the filter of a recorder ends
+_AS_STRONG = 0.5  # part of the strongest mode's amplitude, above which another one may pass for it
 _SAME_MODE = 0.3  # part of the frequency by which two modes may differ and be the same
 
 
@@ -119,10 +123,12 @@ class SignalFigures:
         0.0,
         0.0,
     )  # of how far these are apart: [%], [points of percent]
+    strong_modes: ModeLists = ((), ())  # nearly as strong as the strongest one, by frequency
 
     def as_json(self) -> dict[str, object]:
         step = [one.as_json() if one else None for one in self.steps]
         mode = [_mode_json(one) for one in self.modes]
+        strong = [[_mode_json(one) for one in modes] for modes in self.strong_modes]
         return {
             "delay_s": self.delay,
             "step": {"measured": step[0], "simulated": step[1]},
@@ -131,6 +137,7 @@ class SignalFigures:
                 "simulated": mode[1],
                 "frequency_doubt_percent": self.modes_doubt[0],
                 "damping_doubt_points": self.modes_doubt[1],
+                "strong_modes": {"measured": strong[0], "simulated": strong[1]},
             },
         }
 
@@ -261,24 +268,35 @@ def _ring_downs(
     windows: Windows,
     more: int = 0,
     identify: Identify = modes_without_doubts,
-) -> ModePair:
-    """The mode with which the measured signal rings the most after the event, and the simulated one's same mode.
+) -> ModeLists:
+    """The modes with which the measured and the simulated signal ring after the event.
 
     Both have the measured one's order: at an order of its own, each would have other modes. ``more``: how many
     exponentials are added to it."""
     curves = [_ringing(recording, values, windows) for values in signals]
     order = 0 if curves[0] is None else max(2, order_of(curves[0]) + more)
-    found = [_modes(recording, one, windows, order, identify) for one in curves]
-    if not found[0]:
+    measured, own = (_modes(recording, one, windows, order, identify) for one in curves)
+    return measured, own
+
+
+def _same_mode(measured: Sequence[IdentifiedMode], own: Sequence[IdentifiedMode]) -> ModePair:
+    """The mode with which the measured signal rings the most, and the simulated one's same mode."""
+    if not measured:
         return None, None
-    strongest = found[0][0]
+    strongest = measured[0]
     others = [
         one
-        for one in found[1]
+        for one in own
         if abs(one.frequency_hz - strongest.frequency_hz) < _SAME_MODE * strongest.frequency_hz
     ]
     same = min(others, key=lambda one: abs(one.eigenvalue - strongest.eigenvalue), default=None)
     return strongest, same
+
+
+def _strong(modes: Sequence[IdentifiedMode]) -> list[IdentifiedMode]:
+    """The modes that another look may take for the strongest one, by frequency."""
+    strong = [one for one in modes if one.amplitude > _AS_STRONG * modes[0].amplitude]
+    return sorted(strong, key=lambda one: one.frequency_hz)
 
 
 def modes_apart(modes: ModePair) -> tuple[float, float] | None:
@@ -306,7 +324,7 @@ def _doubt_of_modes(
     seen = [here]
     for part, more in _OTHER_LOOKS:
         later = replace(windows, end=windows.end + part * rest)
-        there = modes_apart(_ring_downs(recording, signals, later, more))
+        there = modes_apart(_same_mode(*_ring_downs(recording, signals, later, more)))
         seen.append((-here[0], -here[1]) if there is None else there)
     frequency, damping = 0.5 * np.ptp(np.array(seen), axis=0)
     return float(frequency), float(damping)
@@ -356,11 +374,13 @@ def compare_signals(
     measured, own = recording.power, simulated
     found = {}
     for name, y, x in (("p", measured.real, own.real), ("q", measured.imag, own.imag)):
-        modes = _ring_downs(recording, (y, x), windows, identify=strongest_modes)
+        rings = _ring_downs(recording, (y, x), windows, identify=strongest_modes)
+        modes = _same_mode(*rings)
         found[name] = SignalFigures(
             delay_between(recording, y, x, windows),
             (step_of(recording, y, windows), step_of(recording, x, windows)),
             modes,
             modes_doubt=_doubt_of_modes(recording, (y, x), windows, modes),
+            strong_modes=(_strong(rings[0]), _strong(rings[1])),
         )
     return found

@@ -14,7 +14,7 @@ from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
 from orchestrator.core.toml_files import Table, fault_of, read_toml
 from orchestrator.studies.validation.event import EventComparison, JumpDoubt
-from orchestrator.studies.validation.figures import ErrorFigures, modes_apart
+from orchestrator.studies.validation.figures import ErrorFigures, ModeLists, modes_apart
 
 Signal = Literal["p", "q", "i_p", "i_q"]
 Window = Literal["before", "during", "after"]
@@ -70,7 +70,7 @@ class OpenCause(StrEnum):
 class Criterion:
     """One figure beside its limit; ``noise``: what the recording's scatter alone may make of the figure.
 
-    ``why_open``: None where it is met or not."""
+    ``why_open``: None where it is met or not. ``rings``: the strong modes of a ring-down that stays open."""
 
     recording: str
     name: str
@@ -81,6 +81,7 @@ class Criterion:
     verdict: LimitVerdict
     device: str = ""
     why_open: OpenCause | None = None
+    rings: ModeLists = ((), ())
 
     @property
     def place(self) -> str:
@@ -232,4 +233,5 @@ def _of_ring_down(limits: LimitTables, comparison: EventComparison) -> Iterator[
                 noise=noise,
                 verdict=verdict,
                 why_open=OpenCause.RING_DOWN if unclear else None,
+                rings=figures.strong_modes if unclear else ((), ()),
             )

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from orchestrator.core.errors import number_of
 from orchestrator.core.options import Option
+from orchestrator.linear.signals.identification import IdentifiedMode
 from orchestrator.studies.validation.beside import WindowApart
 from orchestrator.studies.validation.causes import CauseKind, Explanation
 from orchestrator.studies.validation.device import PlayedDevice
@@ -317,9 +318,25 @@ def open_sentence(criteria: Sequence[Criterion], devices: Sequence[PlayedDevice]
         hint = ""
         if cause is OpenCause.STEP:
             hint = "; give " + Option.STEP + f" '{_finer_step(devices):g} us'"
+        hint += "".join(dict.fromkeys(_rings(one) for one in left if one.why_open is cause))
         said.append(f"{', '.join(names)} ({_WHY_OPEN[cause]}{hint})")
     met = sum(one.verdict is LimitVerdict.MET for one in criteria)
     return f"{met} of {len(criteria)} limits are met, and these stay open: {'; '.join(said)}"
+
+
+def _rings(one: Criterion) -> str:
+    """Name the modes that another look may take for the strongest one, of both; empty where the plant has one."""
+    measured, own = one.rings
+    if len(measured) < 2:
+        return ""
+    signal = one.name.rpartition(" ")[0]
+    return f"; {signal}: the plant has {_frequencies(measured)}, the model {_frequencies(own)}"
+
+
+def _frequencies(modes: Sequence[IdentifiedMode]) -> str:
+    return " and ".join(
+        f"{one.frequency_hz:.3g} Hz at {one.damping_percent:.3g} %" for one in modes
+    )
 
 
 def _finer_step(devices: Sequence[PlayedDevice]) -> float:

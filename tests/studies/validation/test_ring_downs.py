@@ -1,12 +1,22 @@
 """Modes of a measured and a simulated ring-down beside each other: what is the model's, and what is the look's."""
 
+import re
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from orchestrator.studies.validation.figures import compare_signals, modes_apart
-from orchestrator.studies.validation.limits import LimitVerdict, _verdict
+from orchestrator.studies.validation.limits import (
+    LimitTables,
+    LimitVerdict,
+    RingDownLimits,
+    _of_ring_down,
+    _verdict,
+)
 from orchestrator.studies.validation.record import Recording
 from orchestrator.studies.validation.windows import Windows
+from orchestrator.studies.validation.words import open_sentence
 
 INTERVAL = 0.02  # of a recorder that sends 50 samples a second [s]
 LENGTH = 8.0  # [s]
@@ -25,8 +35,8 @@ def rings(*modes):
     return 0.9 + found + 0j
 
 
-def apart(measured, simulated):
-    """Frequency [%] and damping [points] by which the two are apart, and the doubts of both."""
+def compared(measured, simulated):
+    """The figures of P."""
     everywhere = np.ones(len(TIMES), dtype=bool)
     recording = Recording(
         label="rec",
@@ -41,8 +51,23 @@ def apart(measured, simulated):
         average=INTERVAL,
         channels={},
     )
-    figures = compare_signals(recording, simulated, EVENT)["p"]
+    return compare_signals(recording, simulated, EVENT)["p"]
+
+
+def apart(measured, simulated):
+    """Frequency [%] and damping [points] by which the two are apart, and the doubts of both."""
+    figures = compared(measured, simulated)
     return modes_apart(figures.modes), figures.modes_doubt
+
+
+def said(measured, simulated):
+    """What is said about the limits of the ring-down."""
+    comparison = SimpleNamespace(
+        event=SimpleNamespace(recording=SimpleNamespace(label="rec")),
+        signals={"p": compared(measured, simulated)},
+    )
+    limits = LimitTables(source="here", ring_down={"p": RingDownLimits(damping_points=LIMIT)})
+    return open_sentence(list(_of_ring_down(limits, comparison)), [])
 
 
 def scattering(values, size, seed):
@@ -88,3 +113,19 @@ def test_a_sample_that_is_off_at_the_end_changes_nothing(seed):
     (frequency, damping), _ = apart(plant, model)
     assert abs(frequency) < 2
     assert abs(damping) < LIMIT
+
+
+def test_two_modes_that_leave_the_damping_open_are_named_of_both():
+    """Noise that is an eighth of each swing leaves in doubt which of the two a look takes."""
+    text = said(scattering(rings(*BOTH), 5e-3, 1), scattering(rings(*BOTH), 1.25e-3, 10))
+    of_plant, of_model = text.partition("ring-down p: the plant has ")[2].split(", the model ")
+    for named in (of_plant, of_model):
+        found = [float(hertz) for hertz in re.findall(r"([0-9.]+) Hz", named)]
+        assert found == pytest.approx([0.31, 0.76], rel=0.05)
+
+
+def test_a_single_mode_whose_damping_is_open_is_not_named_again():
+    one = (0.5, 0.3, 0.01)
+    text = said(scattering(rings(one), 5e-3, 1), scattering(rings(one), 1.25e-3, 10))
+    assert "ring-down p damping" in text
+    assert "the plant has" not in text
