@@ -131,6 +131,11 @@ class _Best:
     rms: float = float("inf")  # of the errors, in scatters
     values: dict[str, float | bool] = field(default_factory=dict)
 
+    @property
+    def exists(self) -> bool:
+        """Return whether there are any; of a fit without a parameter that can be told they are empty."""
+        return self.cost < float("inf")
+
 
 @dataclass
 class _Search:
@@ -197,7 +202,7 @@ def fit_parameters(
         slopes = _slopes_of_all(residuals, _best_of(searches))
         finished = True
     except KeyboardInterrupt:
-        if not any(one.best.values for one in searches):
+        if not any(one.best.exists for one in searches):
             raise
     found = _best_of(searches)
     values = found.best.values
@@ -241,7 +246,7 @@ def _begun(
 
 def _best_of(searches: Sequence[_Search]) -> _Search:
     """The search that leaves the least; one that was interrupted before it had values is none."""
-    return min((one for one in searches if one.best.values), key=lambda one: one.best.cost)
+    return min((one for one in searches if one.best.exists), key=lambda one: one.best.cost)
 
 
 def _slopes_of_all(residuals: Residuals, found: _Search) -> Matrix | None:
