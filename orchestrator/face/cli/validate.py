@@ -38,7 +38,8 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("--pdf: the page that is printed is written into a folder; give --out DIR")
     with saying_warnings(), said_stages() as report:
         found = validate(options.device, options.recordings, report=report, **_keywords(options))
-    say("question", found.questions)
+    say("question", found.open_questions)
+    say("note", found.notes)
     if options.out:
         found.save(made_folder(options.out, "--out"), pdf=options.pdf)
     if options.json:

@@ -73,14 +73,26 @@ class Validation:
     @property
     def questions(self) -> list[str]:
         """Doubts about the recordings, in sentences."""
-        found = []
+        return [text for _, text in self._sentences()]
+
+    @property
+    def open_questions(self) -> list[str]:
+        """Those that keep a verdict open until they are answered."""
+        return [text for asked, text in self._sentences() if asked.keeps_open]
+
+    @property
+    def notes(self) -> list[str]:
+        """Those to be borne in mind, which leave a verdict standing."""
+        return [text for asked, text in self._sentences() if not asked.keeps_open]
+
+    def _sentences(self) -> Iterator[tuple[Question, str]]:
         for one in self.result.comparisons:
-            found += [f"{one.event.recording.label}: {sentence(asked)}" for asked in one.questions]
+            label = one.event.recording.label
+            yield from ((asked, f"{label}: {sentence(asked)}") for asked in one.questions)
         for one in self.result.others:
             place = f"{one.event.recording.label}, {one.device.name}"
             own = one.questions[len(one.event.questions) :]
-            found += [f"{place}: {sentence(asked)}" for asked in own]
-        return found
+            yield from ((asked, f"{place}: {sentence(asked)}") for asked in own)
 
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor validate --json`` prints, as JSON's types."""
