@@ -41,6 +41,7 @@ _AS_GOOD = 1.15  # times the least error left, up to which the reading that come
 _BEFORE = 1.0  # part of a recording before the event with which readings are tried [s]
 _AFTER = 3.0  # part after its begin, the same [s]
 _LEAVES = 0.25  # part of the error that another scale may leave: parameters change a size as well
+_FOLLOWS = 0.5  # part of the movement that the right unit of the times leaves at most: a device at rest leaves all
 _LEAVES_ALONE = (
     0.12  # the same of a meter that stands alone beyond a transformer: wrong reactances are like it
 )
@@ -201,6 +202,8 @@ def question_readings(comparison: EventComparison, bases: PortBases) -> list[Que
         explained += _meter_elsewhere(comparison, bases, whole)
     if whole > _LEAST_OFF and _is_off_later(comparison):
         explained += _rated_otherwise(comparison, whole)
+    # what leaves more than the plant moved explains nothing, as of a model that falls out of step
+    explained = [one for one in explained if one[0] * whole <= math.hypot(*moved)]
     return [min(explained, key=lambda one: one[0])[1]] if explained else []
 
 
@@ -394,13 +397,13 @@ def _time_unit(comparison: EventComparison, bases: PortBases, error: float) -> I
         ):
             continue
         timed = replace(whole, interval=interval, begin=seconds * whole.begin)
-        left = math.inf
+        left, moved = math.inf, 0.0
         with comparison.device.trials.trial(f"times in {unit}"):
             event = prepare_event(at_port(timed, AT_PORT), bases)
             near = cut_event(event, _AFTER, _BEFORE)
             power = comparison.device.play(near.recording, near.start).power
-            left = math.hypot(*rms_error(power, near))
-        if left <= _LEAVES * error:
+            left, moved = (math.hypot(*one) for one in (rms_error(power, near), rms_movement(near)))
+        if left <= min(_LEAVES * error, _FOLLOWS * moved):
             figures = {"unit": unit, "interval": whole.interval, "length": whole.length}
             figures |= {"error": error, "left": left, "remedy": f"time=time in {unit}"}
             yield Question(QuestionKind.TIME_UNIT, figures)

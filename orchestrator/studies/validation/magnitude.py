@@ -24,7 +24,8 @@ _AFTER = 3.0  # part after its begin, the same [s]
 def ask_of_magnitude(comparison: EventComparison) -> Iterator[Question]:
     """Ask about P and Q that agree with the model's but for the sign.
 
-    Where the sign was lost before the event already, the device started with the other one: it runs again. Values of
+    They follow the recording better than its mean does, as those of a model that falls out of step do not. Where the
+    sign was lost before the event already, the device started with the other one: it runs again. Values of
     one sign alone are another question, which has a sign to give."""
     for role in ("p", "q"):
         if role in comparison.event.recording.channels:
@@ -54,6 +55,6 @@ def _question_of(
         return
     error = float(np.sqrt(np.mean((now - seen) ** 2)))
     left = float(np.sqrt(np.mean((np.abs(own) - seen) ** 2)))
-    if left <= _EXPLAINS * error:
+    if left <= min(_EXPLAINS * error, float(seen.std())):
         figures = {"role": role, "column": recording.channels[role].column, "least": least}
         yield Question(QuestionKind.MAGNITUDE, figures | {"error": error, "left": left})
