@@ -90,6 +90,11 @@ class Confirmation:
         return abs(self.predicted - self.coupled) / max(abs(self.coupled), 1e-12)
 
     @property
+    def damping_predicted(self) -> float:
+        """Damping of the mode with a device without a POD, as its own response predicts it [%]."""
+        return damping_percent(self.with_device + self.predicted - self.coupled)
+
+    @property
     def agrees(self) -> bool:
         return not self.failure and self.error <= AGREES
 

@@ -176,8 +176,15 @@ def _best_confirmed(result: SiteResult, among: str) -> tuple[str, str]:
         f"{with_it(first)}",
         f"; the least damped mode without the device is {title_of_mode(seen.label, seen.mode)}. "
         f"With {_rated(result)}{pod} at the next best places it has {then}, as coupled FMUs say. "
-        f"By {unit(result, '100')} the best are {small}",
+        f"By {unit(result, '100')}{_support_alone(result)} the best are {small}",
     )
+
+
+def _support_alone(result: SiteResult) -> str:
+    """Tell that the ranking's figures are of support without the converter that gives it; "" of a foreign device."""
+    if result.request.is_foreign:
+        return ""
+    return " (support alone: the converter's voltage and delays, which move the mode as well, are not in it)"
 
 
 def _doubt(one: Confirmation) -> str:
@@ -269,10 +276,20 @@ def _confirmed(result: SiteResult, one: Confirmation, before: float) -> str:
         )
     if one in result.breaking:
         word += ", but UNSTABLE with it (`gfor modes` of a case with it tells the cause, often the step)"
-    off = f"prediction off by {100 * one.error:.2g} %"
+    if one.damping < before:
+        steps += ", LESS than without it"
     stable = "" if one in result.breaking else f"; {_stable_with_it(one)}"
     then = f"{least_then(one, before)}{stable}{_lower_beside(one)}"
-    return f"{one.bus}: {word} by coupled FMUs ({off}): {steps}; {then}"
+    return f"{one.bus}: {word} by coupled FMUs ({_prediction(one)}): {steps}; {then}"
+
+
+def _prediction(one: Confirmation) -> str:
+    """Tell what of the mode was predicted, and how far it is off: never the figure of the ranking by support."""
+    off = f"off by {100 * one.error:.2g} %"
+    if one.setting is not None:
+        return f"the mode's shift by a small gain, as predicted, is {off}"
+    predicted = f"the device's own response predicts {one.damping_predicted:.2f} %"
+    return f"{predicted}, the mode's shift is {off}"
 
 
 def end_of_search(one: Confirmation) -> str:

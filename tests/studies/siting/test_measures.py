@@ -311,6 +311,27 @@ def test_a_best_place_whose_prediction_is_off_is_not_called_best_without_saying_
         assert "(NOT CONFIRMED: the prediction is off by 8 %)" in said
 
 
+def test_a_device_that_takes_damping_is_told_beside_what_was_predicted_of_it(five, monkeypatch):
+    """Support alone adds damping there, and the converter that gives it takes some: the row held both, unexplained."""
+    found = planted(monkeypatch, five, bus_11=(4.61, 8.13, True), bus_12=(4.0, 7.30, True))
+    assert "(support alone: the converter's voltage and delays" in answer(found)
+    coupled = eigenvalue(8.0) - found.intact.modes[0].mode.eigenvalue
+    plain = replace(found.confirmations[0], tuned=None, coupled=coupled, predicted=1.01 * coupled)
+    before = found.intact.modes[0].mode.damping_percent
+
+    def row(one):
+        return sureness(replace(found, confirmations=(one,)))[0]
+
+    less, more = (row(replace(plain, with_device=eigenvalue(x))) for x in (8.0, 14.0))
+    expected = replace(plain, with_device=eigenvalue(8.0)).damping_predicted
+    assert f"own response predicts {expected:.2f} %, the mode's shift is off by 1 %)" in less
+    assert 0 < abs(expected - 8.0) < 0.1
+    assert f"{before:.2f} % → 8.00 % with the device of 100 MVA, LESS than without it; " in less
+    assert "LESS than without it" not in more
+    tuned = row(replace(plain, setting=PodSetting(50.0, NO_COMPENSATION), tuned=eigenvalue(14.0)))
+    assert "(the mode's shift by a small gain, as predicted, is off by 1 %)" in tuned
+
+
 def test_what_ended_the_search_is_said(five, monkeypatch):
     found = planted(monkeypatch, five, bus_11=(4.61, 8.13, True))
     (one,) = found.confirmations
