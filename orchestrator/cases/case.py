@@ -161,7 +161,9 @@ class Case(CaseDefinition):
         has = f"the case has: {', '.join(self.scenarios)}"
         for name in scenarios:
             if name not in self.scenarios:
-                problems.append(Problem(Option.SCENARIO, f"there is no scenario {name!r}; {has}"))
+                hint = close_names(name, self.scenarios)
+                text = f"there is no scenario {name!r}; {f'{hint} ' if hint else ''}{has}"
+                problems.append(Problem(Option.SCENARIO, text))
         for name, count in Counter(scenarios).items():
             if count > 1:
                 text = f"the scenario {name!r} is chosen more than once; name it once"
@@ -453,9 +455,10 @@ def load_case(name_or_path: str | Path, *, trust_fmus: bool = False) -> Case:
         hint = f"such as {path / inside[0]}" if inside else "of a case file (.toml) or an SSP"
         raise InputError(f"{name_or_path}: it is a folder; give the path of a file, {hint}")
     if not path.is_file():
+        hint = close_names(str(name_or_path), built_in_cases())
         raise InputError(
             f"{name_or_path}: there is no such file, nor a built-in case of that name; "
-            f"built-in: {', '.join(built_in_cases())}"
+            f"{f'{hint} ' if hint else ''}built-in: {', '.join(built_in_cases())}"
         )
     if path.suffix.lower() == ".ssp":
         return _from_ssp(path, trust_fmus)

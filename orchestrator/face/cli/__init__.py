@@ -2,6 +2,7 @@
 
 import argparse
 import codecs
+import difflib
 import shlex
 import sys
 from collections.abc import Collection, Mapping, Sequence
@@ -250,7 +251,16 @@ class _Once(argparse._StoreAction):
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser whose help opens with the newcomer's page, and which knows the commands that have an unknown option."""
+    """A parser whose help opens with the newcomer's page, and which hints at what an unknown word may mean."""
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        known = list(action.choices or ())
+        near = difflib.get_close_matches(str(value), known, n=1, cutoff=0.75)
+        if near and value not in known:
+            raise argparse.ArgumentError(
+                action, f"there is no command {value!r}; did you mean {near[0]}?"
+            )
+        super()._check_value(action, value)
 
     def format_help(self) -> str:
         return f"{QUESTIONS}\n{super().format_help()}"

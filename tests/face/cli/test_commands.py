@@ -268,6 +268,21 @@ def test_an_unknown_case(refused, tmp_path):
     assert "none.toml: there is no such file" in refused("run", tmp_path / "none.toml")
 
 
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        (["mode", "kundur"], "there is no command 'mode'; did you mean modes?"),
+        (["modes", "kundor"], "; did you mean kundur? built-in: "),
+        (
+            ["modes", "kundur", "--scenario", "gfr"],
+            "'gfr'; did you mean gfor or tgr? the case has: ",
+        ),
+    ],
+)
+def test_a_mistyped_name_is_answered_with_the_near_one(refused, words, hint):
+    assert hint in refused(*words)
+
+
 def test_an_unknown_command(refused):
     assert "invalid choice: 'simulate'" in refused("simulate")
 
