@@ -63,6 +63,8 @@ class Untold(StrEnum):
     AT_BOUND = "at its bound"
     WIDE = "wide"
     NO_BETTER = "no better than the start"
+    INTERRUPTED = "interrupted"
+    ERROR_LEFT = "error left"
 
 
 @dataclass(frozen=True)
@@ -211,8 +213,13 @@ def fit_parameters(
     numbers = _numbers(best, wanted, residuals)
     if finished and _rms(best.errors) > max(_REACHED, _LEAVES * _rms(before)):
         numbers = [_left_at_start(one) for one in numbers]
+    parameters = [*_switches(best, searches, starts, residuals), *numbers]
+    if not finished:
+        parameters = [_doubted(one, Untold.INTERRUPTED) for one in parameters]
+    elif _rms(best.errors) > _REACHED:
+        parameters = [_doubted(one, Untold.ERROR_LEFT) for one in parameters]
     return Fit(
-        parameters=[*_switches(best, searches, starts, residuals), *numbers],
+        parameters=parameters,
         fitted_to=[one.recording.label for one in events],
         error_before=_rms(before),
         error_after=_rms(best.errors),
@@ -469,6 +476,11 @@ def _left_at_start(one: FittedParameter) -> FittedParameter:
     if one.untold not in (None, Untold.AT_BOUND, Untold.WIDE):
         return one
     return replace(one, value=one.start, low=None, high=None, untold=Untold.NO_BETTER)
+
+
+def _doubted(one: FittedParameter, why: Untold) -> FittedParameter:
+    """A parameter that the fit as a whole does not tell; a reason of its own stays."""
+    return one if one.untold else replace(one, untold=why)
 
 
 def _doubt(one: Adjustable, value: float, width: float) -> Untold | None:

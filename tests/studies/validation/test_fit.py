@@ -45,6 +45,8 @@ def test_intervals_beside_an_error_that_stays_do_not_hold(recording):
     found = gfor_in_python.validate("gfor", recording, values=values, fit="pod_p.K")
     assert not found.result.fit.reached
     assert not found.as_json()["fit"][0]["holds"]
+    assert found.as_json()["fit"][0]["why_not"] == "error left"
+    assert "not told: the fit leaves more of the error" in found.html()
     assert "95 %, does not hold" in found.html()
 
 
@@ -130,9 +132,8 @@ def test_an_interrupted_fit_keeps_the_best_values_so_far(recording):
     (one,) = content["fit"]
     assert one["value"] != 60
     assert (one["low"], one["high"]) == (None, None)
-    assert (
-        one["why_not"] is None
-    )  # a fit that was not ended has not found that there is nothing better
+    # not that there is nothing better: a fit that was not ended has not found that
+    assert one["why_not"] == "interrupted"
     (check,) = content["fit_events"]
     assert check["rms_after_pu"] < check["rms_before_pu"]
 
