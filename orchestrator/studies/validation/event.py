@@ -230,7 +230,9 @@ def _slow_samples(comparison: EventComparison) -> list[Question]:
         and info.unit == "s"
         and info.name not in NEVER
     }
-    fast = sorted(name for name, value in times.items() if 0 < value < 2 * interval)
+    # time constant [s] whose corner, 1/(2πτ), is at the fastest frequency that the samples hold
+    slowest = interval / np.pi
+    fast = sorted(name for name, value in times.items() if 0 < value < slowest)
     such = ", ".join(f"{name} = {times[name]:g} s" for name in fast[:_SUCH])
     figures = {
         "interval": interval,
