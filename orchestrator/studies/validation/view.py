@@ -393,4 +393,8 @@ def _worst_criteria(criteria: Sequence[Criterion]) -> ShownTable:
     met = sum(one.verdict is LimitVerdict.MET for one in criteria)
     several = len({one.device for one in criteria}) > 1
     title = f"Limits: {met} of {len(criteria)} met"
+    if len(criteria) > _SHOWN:
+        title += (
+            f"; the {_SHOWN} nearest to failing are listed, and all of them in JSON and on the page"
+        )
     return criteria_table(title, worst[:_SHOWN], by_device=several)

@@ -361,7 +361,7 @@ def difference_sentence(places: Sequence[WindowApart]) -> str:
     )
 
 
-EXPLANATION_COLUMNS = ("Cause", "Now", "Instead", "rms error left [pu]", "Explains", "Most of it")
+EXPLANATION_COLUMNS = ("Cause", "Now", "Instead", "rms error left [pu]", "Explains", "Likely")
 """Heads of `explanation_cells`."""
 
 
@@ -388,8 +388,14 @@ def explanation_cells(one: Explanation) -> tuple[str, ...]:
         f"{value_text(one.value)}{beside}",
         f"{one.left:.4g} of {one.error:.4g}",
         f"{one.share:.0%}",
-        "yes" if one.explains else "no",
+        _likely(one),
     )
+
+
+def _likely(one: Explanation) -> str:
+    if one.outdone:
+        return "no: another leaves clearly less"
+    return "yes" if one.explains else "no"
 
 
 def explanation_sentence(
@@ -460,10 +466,16 @@ def _cause(one: Explanation) -> str:
             return f"{one.name} = {value_text(one.value)}{unit}{beside} (now {value_text(one.now)})"
 
 
+_NAMED = 2  # trials that did not run, in the sentence that counts them
+
+
 def refused_sentence(refused: Sequence[RefusedTrial]) -> str:
-    """Count what was tried and did not run: it says little, and nothing vanishes."""
+    """Name the first trials that did not run, and count the others: nothing vanishes."""
     many = number_of(len(refused), "trial")
-    return f"{many} of other readings or values did not run; JSON and the page name them."
+    named = "; ".join(f"{one.tried} ({one.reason})" for one in refused[:_NAMED])
+    more = len(refused) - _NAMED
+    others = f"; JSON and the page name {more} more" if more > 0 else ""
+    return f"{many} of other readings or values did not run: {named}{others}."
 
 
 def interval_head(fit: Fit) -> str:

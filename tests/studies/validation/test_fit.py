@@ -57,7 +57,7 @@ def test_what_did_not_run_is_counted_where_something_is_asked_or_searched(record
     result.request.device.trials.note(
         "P and Q of one phase", gfor_in_python.CosimError("too large")
     )
-    counted = "1 trial of other readings or values did not run"
+    counted = "1 trial of other readings or values did not run: P and Q of one phase (too large)."
     assert not any(counted in str(one) for one in parts(found))
     assert len(found.as_json()["refused"]) == 1
     searched = Validation(replace(result, request=replace(result.request, explain=True)))
