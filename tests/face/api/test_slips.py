@@ -109,7 +109,7 @@ def test_results_are_asked_for_a_file_as_a_mapping(tmp_path):
     [
         (
             lambda c: c.scenario("pod_x"),
-            "scenario: there is no scenario 'pod_x'; the case has: base",
+            "scenario: there is no scenario 'pod_x'; did you mean pod_q or pod_p or pod_pq? the case has: base",
         ),
         (lambda c: c.scenario("gfor", step=5), "step: a communication step of 5 s is too long"),
         (lambda c: c.scenario("gfor", fault="bus_9, 150 ms"), "fault 'bus_9, 150 ms': component"),
