@@ -137,7 +137,8 @@ def test_what_grows_beside_damped_modes_of_the_range_is_named():
     asked = SiteRequest("pod_p", scenario="manual", confirm=0)
     found = find_sites(load_case("kundur"), asked)
     assert sureness(found)[0].startswith(
-        "UNSTABLE without the device: intact (a mode grows at +0.005153 1/s (no oscillation; "
+        "UNSTABLE without the device: intact (every swing is damped, and the common speed drifts at "
+        "+0.005153 1/s without a governor (sg1.machine.omega, "
     )
     assert "; least damped in the range: inter-area, 0.542 Hz, 3.27 %)" in sureness(found)[0]
     page = Siting(found).page_text()
