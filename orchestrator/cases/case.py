@@ -10,6 +10,7 @@ from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import cached_property, partial
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import tomli_w
@@ -82,6 +83,12 @@ def with_protection(case: Case, code: NoTripCode | None) -> Case:
 
 def built_in_cases() -> tuple[str, ...]:
     return tuple(sorted(p.parent.name for p in BUILT_IN.glob("*/case.toml")))
+
+
+def as_typed(case: CaseDefinition) -> str:
+    """Return what is typed for a case at a command line: a built-in one's name, or the path of a file."""
+    path = case.path
+    return path.parent.name if path.is_relative_to(BUILT_IN) else quote(str(path))
 
 
 class Case(CaseDefinition):

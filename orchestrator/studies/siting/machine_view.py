@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
+from orchestrator.cases.case import as_typed
 from orchestrator.core.errors import few
 from orchestrator.output.report.column_table import ShownTable
 from orchestrator.output.report.html.elements import document
@@ -94,11 +95,11 @@ def _command(result: MachineSites) -> str:
     if not result.free:
         return ""
     request, name = result.request, result.free[0]
-    words = ["gfor", "design", result.case.name, "--scenario", result.prepared.name]
+    words = ["--scenario", result.prepared.name]
     for key, value in {**request.overrides, f"{name}.stabilizer": PART}.items():
         words += ["--set", f"{key}={str(value).lower() if isinstance(value, bool) else value}"]
     words += ["--component", name, "--controller", CONTROLLER]
-    return f"; design one at {name} with: {shlex.join(words)}"
+    return f"; design one at {name} with: gfor design {as_typed(result.case)} {shlex.join(words)}"
 
 
 def sureness(result: MachineSites) -> list[str]:

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -201,10 +202,11 @@ def test_a_swing_outside_of_the_range_is_named_where_it_has_less_damping(damping
     modes = result().modes
     swing = complex(damping, 2 * np.pi * 2.21)
     modes.hidden = Hidden((0.1, 2.0), 9, swing, (swing,))
+    modes.prepared.case.path = Path("my grid.toml")
     text = outside([modes])
     assert named in text
     assert text.endswith("; --details tells of them.")
-    assert ("(`gfor modes CASE --range 0.1:2.3`)" in text) == (damping == -0.4)
+    assert ("(`gfor modes 'my grid.toml' --range 0.1:2.3`)" in text) == (damping == -0.4)
     assert "--details" not in outside([modes], details=True)
 
 

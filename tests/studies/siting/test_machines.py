@@ -3,10 +3,11 @@
 import json
 import re
 import shlex
+import shutil
 
 import pytest
 
-from orchestrator.cases.case import load_case
+from orchestrator.cases.case import as_typed, load_case
 from orchestrator.core.errors import InputError
 from orchestrator.studies.siting.machine_view import MachineSiting
 from orchestrator.studies.siting.machines import find_machines
@@ -43,6 +44,16 @@ def test_the_command_designs_at_the_best_machine_with_that_angle(gfor, tmp_path)
     # the mode is that of the step map here, and that of the continuous system there
     assert design["sensitivity"]["phase_deg"] == pytest.approx(shift.angle, abs=1.0)
     assert design["sensitivity"]["magnitude"] == pytest.approx(abs(shift.change), rel=0.02)
+
+
+def test_the_command_names_the_file_of_a_case_that_is_not_built_in(tmp_path):
+    """Its name in the file is not what the command takes."""
+    copied = tmp_path / "my grid" / "mine.toml"
+    shutil.copytree(load_case("two_area").path.parent, copied.parent)
+    (copied.parent / "case.toml").rename(copied)
+    assert as_typed(load_case(copied)) == f"'{copied}'"
+    assert as_typed(load_case("two_area")) == "two_area"
+    assert load_case(shlex.split(as_typed(load_case(copied)))[0]).name == "two_area"
 
 
 def test_stabilised_and_fixed_machines_are_told_and_not_confirmed(gfor):
