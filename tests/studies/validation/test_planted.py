@@ -215,7 +215,7 @@ PLANTED = {
     ),
     "Q was not recorded": (lambda f: f.assign(q_mvar=0.0), "channel does not move"),
     "one sample of P is wild": (
-        lambda f: f.assign(p_mw=f.p_mw.where(f.index != 3000, -9999.0)),
+        lambda f: f.assign(p_mw=f.p_mw.where(f.index != 3000, -8765.4)),
         "spike",
     ),
     "held": (held, "angle held"),
