@@ -9,6 +9,7 @@ from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.dyr_mistakes import (
     LEAST_STRANGE,
     count_repeats,
+    going_with_shafts,
     other_network,
     records_unfit,
     slips,
@@ -116,7 +117,8 @@ def _refuse_what_lacks(
         strange = []
         accounted |= {*bare}
     unfit = records_unfit(found.parts, accounted, found.labels)
-    problems = [*(slips(strange) if bare else ()), *problems, *unfit]
+    with_shafts = going_with_shafts(found.unread, found.records)
+    problems = [*(slips(strange) if bare else ()), *problems, *with_shafts, *unfit]
     if not problems and not missing:
         return
     counted_once = [*count_repeats(problems, found.first_places)]

@@ -75,6 +75,23 @@ def _incomplete(machine: str, own: Mapping[str, str], unit: str) -> Iterator[str
     )
 
 
+def going_with_shafts(
+    unread: Sequence[DynamicRecord], records: Mapping[tuple[int, str], Sequence[DynamicRecord]]
+) -> Iterator[str]:
+    """Yield what has to go with a shaft that cannot be read and is left out: the records that act on it.
+
+    ``records``: of each machine, all of them."""
+    shafts = [one for one in unread if RECORDS_OF_UNITS[one.name].kind == "shaft"]
+    beside = {one.name for shaft in shafts for one in records[shaft.bus, shaft.machine]}
+    acting = [name for name in beside & {*PLANT_RECORDS} if PLANT_RECORDS[name].kind in ON_SHAFT]
+    if acting:
+        shaft = shafts[0].name
+        yield (
+            f"to leave out {shaft}, leave out what acts on its shaft as well: write "
+            f"{without_models(sorted([shaft, *acting]))}, and the shaft turns at rated speed"
+        )
+
+
 def _converters_of_plants() -> set[str]:
     """Parts of the records of converters that need a control."""
     return {record.part for record in PLANT_RECORDS.values() if record.kind == "converter"}

@@ -27,7 +27,7 @@ class PartsOfMachines:
     ``parts``, ``names``: our part and PSS/E's record by the kind of part. ``values``, ``lines``: of parameters.
     ``records``: of each machine, all of them. ``problems``: in the order of the file. ``first_places``: of the first
     record, by the problem. ``without``: names of converters' records, which have a remedy of their own. ``lacking``:
-    machines whose own record no part stands for."""
+    machines whose own record no part stands for. ``unread``: records whose values are wrong."""
 
     def __init__(
         self, machines: Sequence[Machine], left: Collection[str], *, approximate: bool
@@ -45,6 +45,7 @@ class PartsOfMachines:
         self.first_places: dict[str, str] = {}
         self.without: set[str] = set()
         self.lacking: set[MachineKey] = set()
+        self.unread: list[DynamicRecord] = []
 
     def take(self, record: DynamicRecord) -> None:
         """Take a record of a machine in service; others, and models that are left out, set nothing."""
@@ -84,6 +85,7 @@ class PartsOfMachines:
             own = values_of_record(record, known)
         except InputError as error:
             self.problems.append(str(error))
+            self.unread.append(record)
             return
         self.values[key] |= own
         self.lines[key] |= dict.fromkeys(own, record.line)

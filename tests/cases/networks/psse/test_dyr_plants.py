@@ -1,6 +1,7 @@
 """WECC's generic plants in dynamics data: REGCA1 with REECA1 or REECB1, and REPCA1, as models of their own."""
 
 import json
+import re
 
 import pytest
 import xarray as xr
@@ -312,6 +313,28 @@ def test_the_system_with_such_a_plant_has_modes_and_a_run(records, prepared, tmp
 def test_records_that_lack_something_are_named(lines, words, prepared):
     with pytest.raises(CaseError, match=f"(?ms){words}"):
         prepared(with_records(*lines), "")
+
+
+def test_a_shaft_that_cannot_be_read_names_what_goes_with_it(prepared):
+    """Planted: a value too few in WTDTA1. The case that takes the remedy as it stands is read in one round."""
+    short = OF_GRIDPACK[3].replace(" 0 0 0 /", " 0 0 /")
+    lines = with_records(OF_REGCA1, line("REECA1", BATTERY), *OF_GRIDPACK[:3], short)
+    with pytest.raises(CaseError, match="WTDTA1 has 4 values, and needs 5") as refused:
+        prepared(lines, "")
+    told = re.search(
+        r"to leave out WTDTA1, .*: write (dyr_leave_out = \[.*?\])", str(refused.value)
+    )
+    assert told is not None
+    assert told[1] == "dyr_leave_out = ['WTARA1', 'WTDTA1', 'WTPTA1', 'WTTQA1']"
+    assert unit(prepared(lines, told[1] + "\n")).description.model_name == "regca1_phasor"
+
+
+def test_a_record_that_cannot_be_read_beside_a_good_shaft_names_nothing_else(prepared):
+    slope = OF_GRIDPACK[0].replace("0.007", "0.007 0")
+    lines = with_records(OF_REGCA1, line("REECA1", BATTERY), slope, *OF_GRIDPACK[1:])
+    with pytest.raises(CaseError, match="WTARA1 has 3 values, and needs 2") as refused:
+        prepared(lines, "")
+    assert "to leave out" not in str(refused.value)
 
 
 MACHINE_OF_PVD1 = (
