@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from shlex import quote
 
 import numpy as np
 
@@ -25,6 +26,15 @@ from orchestrator.devices.fmi.description import VariableInfo
 _FORMS = "START:STOP:COUNT, log:START:STOP:COUNT or a list such as 0.1,0.2,0.5"
 # one ``component.parameter`` or several; each may be a pattern
 _KEYS = r"[^.\s]+\.[^\s,]+(\s*,\s*[^.\s]+\.[^\s,]+)*"
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_SPAN = re.compile(
+    rf"({_NUMBER}(?:\s*[^\W\d]+?)?)\s*(?:-|–|\.\.+|to)\s*({_NUMBER}(?:\s*[^\W\d]+)?)", re.ASCII
+)
+"""A range as many write it: ``0.1-0.5``, ``0.1..0.5`` or ``0.1 to 0.5``, each number with or without a unit."""
+
+_SPAN_COUNT = (
+    11  # values of a range that a message shows how to write: both ends, and tenths between
+)
 _LENGTH = "length"  # of a line, as the last part of a key
 _SCR = "scr"  # short-circuit ratio, as the last part of a key
 _MOST = 100_000
@@ -88,6 +98,7 @@ def parse_vary(text: str) -> Vary:
     if not equals or not named or not given:
         raise ValueError(f"{text!r} is not of the form component.parameter={_FORMS}")
     if ":" not in given:
+        _refuse_span(key, given)
         values = tuple(read_value(part.strip()) for part in given.split(","))
         if any(value == "" for value in values):
             raise ValueError(f"{text!r}: a value of the list is missing; write it like 0.1,0.2,0.5")
@@ -104,6 +115,17 @@ def parse_vary(text: str) -> Vary:
             f"{text!r}: COUNT = {parts[2]!r}; it must be a whole number from 2 to {_MOST}"
         )
     return Vary(key, (read_value(parts[0]), read_value(parts[1])), int(parts[2]), logarithmic, ())
+
+
+def _refuse_span(key: str, given: str) -> None:
+    """Refuse a range in another form than ours, which would be read as a number with a strange unit."""
+    span = _SPAN.fullmatch(given)
+    if span:
+        limits = f"{key}={span[1]}:{span[2]}"
+        raise ValueError(
+            f"{key}: {given!r} is neither a value nor a range; write {quote(f'{limits}:{_SPAN_COUNT}')} for "
+            f"{_SPAN_COUNT} values, or {quote(limits)} in a search with " + Option.UNTIL
+        )
 
 
 def resolve(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:

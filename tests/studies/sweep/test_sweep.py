@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+import shlex
 from dataclasses import replace
 from functools import partial
 
@@ -242,6 +243,25 @@ def test_values_that_cannot_be_used(gfor, case, tmp_path, vary, words):
     assert (code, out) == (2, "")
     assert words in err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("given", "limits"),
+    [
+        ("slow.T=0.1-0.5", (0.1, 0.5)),
+        ("slow.T=1e-3..0.5", (0.001, 0.5)),
+        ("slow.T=-1--0.5", (-1, -0.5)),
+        ("slow.T=100 ms to 0.5s", (0.1, 0.5)),
+    ],
+)
+def test_a_range_in_another_form_is_told_in_ours(gfor, case, given, limits):
+    """What the message tells to write, typed as a shell reads it, is that range."""
+    code, _, err = gfor(case, "--vary", given)
+    told = re.search(r"is neither a value nor a range; write (.+) for 11 values", err)
+    assert code == 2
+    (typed,) = shlex.split(told[1])
+    (axis,) = plan_sweep(load_case(case), SweepRequest([parse_vary(typed)], ["one"])).axes
+    assert axis.values == pytest.approx(np.linspace(*limits, 11))
 
 
 @pytest.mark.parametrize(
