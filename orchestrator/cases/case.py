@@ -20,7 +20,7 @@ from fmus.toolchain.cache import cache_directory
 from orchestrator.cases.form.definition import CaseDefinition
 from orchestrator.cases.form.locate import place_in
 from orchestrator.cases.form.model_kinds import kind_wanted, of_kind
-from orchestrator.cases.form.names import close_names
+from orchestrator.cases.form.names import close_names, no_scenario
 from orchestrator.cases.form.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.form.schema import CaseTable, ComponentTable, Value
 from orchestrator.cases.form.values import TWICE, flatten, given_twice
@@ -165,12 +165,9 @@ class Case(CaseDefinition):
     def _check_choice(self, scenarios: Sequence[str]) -> None:
         """Refuse scenarios that the case does not have, or that are chosen twice."""
         problems = []
-        has = f"the case has: {', '.join(self.scenarios)}"
         for name in scenarios:
             if name not in self.scenarios:
-                hint = close_names(name, self.scenarios)
-                text = f"there is no scenario {name!r}; {f'{hint} ' if hint else ''}{has}"
-                problems.append(Problem(Option.SCENARIO, text))
+                problems.append(Problem(Option.SCENARIO, no_scenario(name, self.scenarios)))
         for name, count in Counter(scenarios).items():
             if count > 1:
                 text = f"the scenario {name!r} is chosen more than once; name it once"

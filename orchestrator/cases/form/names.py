@@ -78,6 +78,14 @@ def close_names(wanted: str, known: Iterable[str], otherwise: str = "") -> str:
     return f"did you mean {' or '.join(close)}?" if close else otherwise
 
 
+def no_scenario(wanted: str, known: Iterable[str]) -> str:
+    """That a case has no scenario of a name, which ones are near, and all that it has."""
+    names = list(known)
+    hint = close_names(wanted, names)
+    has = f"the case has: {', '.join(names)}"
+    return f"there is no scenario {wanted!r}; {f'{hint} ' if hint else ''}{has}"
+
+
 def hint_at(described: FmuDescription, wanted: str, known: Iterable[str], otherwise: str) -> str:
     """A hint at a variable's name, which may be the FMU's own name of a variable that a binding calls otherwise."""
     bound = getattr(described, "bound_names", None)

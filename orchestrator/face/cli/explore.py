@@ -7,6 +7,7 @@ from pathlib import Path
 from warnings import catch_warnings, simplefilter
 
 from fmus.toolchain.temporary import own_folder, remove
+from orchestrator.cases.form.names import no_scenario
 from orchestrator.core.asked import read_whole
 from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import write_text
@@ -41,9 +42,7 @@ def run(options: argparse.Namespace) -> int:
     names = options.scenario or [kind.get("scenario", first_shown(case))]
     unknown = [name for name in names if name not in case.scenarios]
     if unknown:
-        raise InputError(
-            f"--scenario: there is no scenario {unknown[0]!r}; the case has: {', '.join(case.scenarios)}"
-        )
+        raise InputError(f"--scenario: {no_scenario(unknown[0], case.scenarios)}")
     name, *further = dict.fromkeys(names)
     if further and options.save is None:
         raise InputError(

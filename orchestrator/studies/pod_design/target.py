@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import repeat
 
 from orchestrator.cases.case import Case
+from orchestrator.cases.form.names import no_scenario
 from orchestrator.cases.form.parameter_files import ParameterFile
 from orchestrator.cases.form.schema import CaseTable, NamedModeTable, Value
 from orchestrator.cases.questions.idle_values import DAMPING_CONTROLLERS
@@ -170,10 +171,7 @@ def find_scenario(
     """The scenario that is asked for; by default that in which all PODs exist and are off."""
     if scenario is not None:
         if scenario not in case.scenarios:
-            raise InputError(
-                Option.SCENARIO + f": there is no scenario {scenario!r}; the case has: "
-                f"{', '.join(case.scenarios)}"
-            )
+            raise InputError(Option.SCENARIO + f": {no_scenario(scenario, case.scenarios)}")
         return scenario
     plans = {name: case.components_of(name, overrides, parameters) for name in case.scenarios}
     on = {

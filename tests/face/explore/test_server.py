@@ -470,6 +470,10 @@ def test_the_command_prints_its_address_and_ends_by_ctrl_c():
             ["two_area", "--scenario", "none"],
             "there is no scenario 'none'; the case has: base, gfor",
         ),
+        (
+            ["two_area", "--scenario", "pod_x"],
+            "there is no scenario 'pod_x'; did you mean pod_q or pod_p or pod_pq? the case has: base",
+        ),
     ],
 )
 def test_what_cannot_be_shown_is_said_at_once(words, says, capsys):

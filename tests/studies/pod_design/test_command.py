@@ -183,6 +183,10 @@ def test_no_stages_leave_the_lead_lag_out(design):
             "--scenario: there is no scenario 'none'; the case has: base, gfor",
         ),
         (
+            ["--scenario", "gfr"],
+            "--scenario: there is no scenario 'gfr'; did you mean gfor? the case has: base, gfor",
+        ),
+        (
             ["--scenario", "gfor", "--scenario", "pod_q"],
             "gfor design is for one scenario, not for gfor and pod_q",
         ),
