@@ -1,6 +1,5 @@
 """The values that move a mode most: which are looked at, and how far a round step of each moves it."""
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -17,7 +16,6 @@ _OF_NETWORK = (
     12  # of these, the network's, of a large case: the case is started anew several times for each
 )
 _LARGE = 600  # states from which on the network's values are left out
-_PART = 0.1  # of a value: about the step whose effect a sentence tells
 _RATIO = 5.0  # a slider goes up to so many times the value, and down to such a part of it
 _NO_EFFECT = 1e-6  # |Δλ| for one percent of a value, as a part of |λ|, below which it moves nothing
 
@@ -128,31 +126,20 @@ def _near(scenario: Scenario, shares: Mapping[str, float], names: Sequence[str])
 def _as_json(row: Sensitivity) -> dict[str, Any]:
     """``parameter``, its ``value`` and ``unit``, a round ``step`` within its bounds with the ``points`` of damping and
     the ``hertz`` that this step moves the mode by to first order, the declared bounds, and ``doubts``."""
-    parameter = row.parameter
-    step = round_step(_PART * parameter.scale)
-    if not parameter.allows(step):
-        step = -step
-    points, hertz = row.damping_per_unit, row.frequency_per_unit
+    parameter, points, hertz = row.parameter, row.points, row.frequency_per_unit
     assert points is not None
     assert hertz is not None
     return {
         "parameter": parameter.name,
         "value": parameter.value,
         "unit": parameter.unit,
-        "step": step,
-        "points": points * step,
-        "hertz": hertz * step,
+        "step": parameter.step,
+        "points": points,
+        "hertz": hertz * parameter.step,
         "minimum": parameter.minimum,
         "maximum": parameter.maximum,
         "doubts": list(row.doubts),
     }
-
-
-def round_step(size: float) -> float:
-    """The number of 1, 2 or 5 times a power of ten that is nearest to a size above 0, in ratio."""
-    power = math.floor(math.log10(size))
-    near = (digit * 10.0**exponent for exponent in (power, power + 1) for digit in (1, 2, 5))
-    return float(f"{min(near, key=lambda x: abs(math.log(x / size))):.1g}")
 
 
 def grid_of(mover: Mapping[str, Any], count: int) -> list[float]:

@@ -1,6 +1,7 @@
 """Which parameters of a running system a mode can be differentiated by."""
 
 import fnmatch
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -11,6 +12,7 @@ from orchestrator.devices.fmi.description import FmuDescription, VariableInfo
 from orchestrator.systems.coupling.master import Master
 
 SHARE = 0.01  # part of a parameter for which effects "per percent" are given
+_USUAL = 0.1  # part of a parameter that is about its usual step
 
 
 @dataclass(frozen=True)
@@ -34,10 +36,23 @@ class Parameter:
         """Size that steps and percents are related to: |value|, or 1 of its unit where it is 0."""
         return abs(self.value) or 1.0
 
+    @property
+    def step(self) -> float:
+        """A round step within the bounds: about a tenth of the value, or of 1 unit where it is 0."""
+        step = round_step(_USUAL * self.scale)
+        return step if self.allows(step) else -step
+
     def allows(self, change: float) -> bool:
         changed = self.value + change
         above = self.minimum is None or changed >= self.minimum
         return above and (self.maximum is None or changed <= self.maximum)
+
+
+def round_step(size: float) -> float:
+    """The number of 1, 2 or 5 times a power of ten that is nearest to a size above 0, in ratio."""
+    power = math.floor(math.log10(size))
+    near = (digit * 10.0**exponent for exponent in (power, power + 1) for digit in (1, 2, 5))
+    return float(f"{min(near, key=lambda x: abs(math.log(x / size))):.1g}")
 
 
 def parameters_of(

@@ -97,8 +97,14 @@ class Sensitivity:
         return self._for_a_percent(self.damping_per_unit)
 
     @property
+    def points(self) -> float | None:
+        """[points] for the parameter's usual step, to first order; see `Parameter.step`."""
+        per_unit = self.damping_per_unit
+        return None if per_unit is None else per_unit * self.parameter.step
+
+    @property
     def effect(self) -> float:
-        """|Δλ| [rad/s] for one percent of the parameter, of 1 unit where it is 0; by which rows are sorted."""
+        """|Δλ| [rad/s] for one percent of the parameter, of 1 unit where it is 0."""
         return (
             0.0 if self.derivative is None else SHARE * self.parameter.scale * abs(self.derivative)
         )
@@ -198,9 +204,7 @@ def find_sensitivities(
     if patterns:
         about_mode += _idle(prepared, rows)
     warnings = _neighbour(found.model, chosen)
-    ordered = sorted(
-        rows.values(), key=lambda row: (row.derivative is None, -row.effect, row.parameter.name)
-    )
+    ordered = sorted(rows.values(), key=_place)
     if warnings:
         ordered = [
             replace(x, doubts=(*x.doubts, "double eigenvalue")) if x.derivative else x
@@ -208,6 +212,23 @@ def find_sensitivities(
         ]
     doubted = (_limited(row, acting) for row in ordered)
     return SensitivityResult(found, chosen, tuple(doubted), held, (*about_mode, *warnings))
+
+
+def _place(row: Sensitivity) -> tuple[bool, bool, bool, float, float, str]:
+    """Order rows by what moves damping most for the same percentage.
+
+    A value of 0 has no percentage, and stands behind, by what its usual step moves; then comes what moves nothing, and
+    what has no derivative."""
+    per_percent = row.damping_per_percent
+    points = row.points if per_percent is None else per_percent
+    return (
+        row.derivative is None,
+        not row.derivative,
+        per_percent is None,
+        -abs(points or 0.0),
+        -row.effect,
+        row.parameter.name,
+    )
 
 
 def _idle(prepared: PreparedScenario, rows: Mapping[Parameter, Sensitivity]) -> tuple[str, ...]:

@@ -4,7 +4,8 @@ import pytest
 
 import orchestrator as gfor
 from orchestrator.core.errors import InputError
-from orchestrator.face.explore.movers import candidates, grid_of, movers, round_step
+from orchestrator.face.explore.movers import candidates, grid_of, movers
+from orchestrator.studies.sensitivities.parameters import round_step
 
 RANGE = (0.1, 2.0)
 
