@@ -22,7 +22,7 @@ from orchestrator.face.cli.terminal import make_console, print_json, print_warni
 from orchestrator.face.cli.verdict import add_verdict_argument, exit_code, print_verdicts
 from orchestrator.output.results.lock import hold_folder
 from orchestrator.studies.sensitivities.request import SensitivitiesRequest
-from orchestrator.studies.sensitivities.view import left_out, sensitivity_table
+from orchestrator.studies.sensitivities.view import left_out, sensitivity_table, tell_most
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -63,6 +63,7 @@ def _compute(
         print_warnings(results)
         for one in found:
             warn(one.result.modes.prepared.name, one.result.warnings)
+            console.print(escape(tell_most(one.result)), "")
             console.print(sensitivity_table(one.result), "")
             missing = left_out(one.result)
             if missing:

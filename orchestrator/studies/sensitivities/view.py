@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from orchestrator.studies.sensitivities.sensitivities import Sensitivity, Sensit
 
 
 class Sensitivities:
-    """∂λ/∂p of one mode by the parameters of all FMUs, largest effect first.
+    """∂λ/∂p of one mode by the parameters of all FMUs, first what moves damping most for the same percentage.
 
     Attributes
     ----------
@@ -63,7 +64,8 @@ class Sensitivities:
         )
 
     def _repr_html_(self) -> str:
-        table, lines = self.table(), [f"warning: {text}" for text in self.warnings]
+        table = self.table()
+        lines = [tell_most(self.result), *(f"warning: {text}" for text in self.warnings)]
         for name, text in _long_texts(table).items():
             lines.append(f"{name}: {text}")
         return page(repr(self).strip("<>"), lines, table.map(_short_text))
@@ -87,15 +89,38 @@ def _short_text(value: Any) -> Any:
     return "see above" if isinstance(value, str) and len(value) > _LONGEST else value
 
 
-def sensitivity_table(result: SensitivityResult) -> ColumnTable[Sensitivity]:
+_TOLD = 3
+"""Values that a sentence names, those that move the mode most."""
+
+
+def name_of(result: SensitivityResult) -> str:
+    """Return a mode's name, frequency and damping."""
     mode = result.mode
     name = result.modes.name_of(mode) or "critical"
-    kind = (
-        "the operating point held"
-        if result.held
-        else "total: the operating point moves with the parameter"
+    return f"{name}, {mode.frequency_hz:.4f} Hz, {mode.damping_percent:.2f} %"
+
+
+def tell_most(result: SensitivityResult) -> str:
+    """Tell what moves the damping most, of the figures without a doubt, and how the rows are ordered."""
+    trusted = (row for row in result.rows if row.damping_per_percent and not row.doubts)
+    first = [
+        f"{row.parameter.name} ({_text(row.damping_per_percent)})" for row in islice(trusted, _TOLD)
+    ]
+    most = f"damping moves most with {', '.join(first)}, in points for 1 % more of the value"
+    return (
+        f"{name_of(result)}: {most if first else 'no percentage of a value moves its damping'}. The table is ordered "
+        "by points per %, the largest first; values of 0, which have no percent, come behind"
     )
-    title = f"{result.modes.prepared.title}, {name}, {mode.frequency_hz:.4f} Hz, {mode.damping_percent:.2f} %; {kind}"
+
+
+def sensitivity_table(result: SensitivityResult) -> ColumnTable[Sensitivity]:
+    point = (
+        "is held" if result.held else "moves with the value, which the figures include, or stays"
+    )
+    title = (
+        f"{result.modes.prepared.title}, {name_of(result)}: how it changes for one unit and for 1 % more of each "
+        f"value. A point is one percent of damping, as from 5 % to 6 %. The operating point {point}"
+    )
     return ColumnTable(
         title,
         (
@@ -132,7 +157,7 @@ def sensitivity_table(result: SensitivityResult) -> ColumnTable[Sensitivity]:
             Column("", lambda row: _part(row.derivative, "imag"), name="imag_per_unit"),
             Column("", lambda row: _part(row.continuous, "real"), name="continuous_real_per_unit"),
             Column("", lambda row: _part(row.continuous, "imag"), name="continuous_imag_per_unit"),
-            Column("Point", lambda row: row.operating_point, name="operating_point"),
+            Column("Operating point", lambda row: row.operating_point, name="operating_point"),
             Column("", lambda row: "; ".join(row.doubts), name="doubts"),
             Column("", lambda row: row.reason, name="reason"),
             Column("Doubt", lambda row: row.reason or "; ".join(row.doubts), text=True),

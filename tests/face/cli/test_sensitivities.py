@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 
 import pytest
 
@@ -35,7 +36,23 @@ def test_the_command_prints_and_writes_what_the_interface_gives(gfor, tmp_path):
     assert "gfor.pod_p.T_S1" in own._repr_html_()
     code, out, _ = gfor("sensitivities", *options, "--held")
     assert code == 0
-    assert "the operating point held" in out
+    assert "The operating point is held" in " ".join(out.split())
+
+
+def test_the_first_lines_tell_what_moves_the_mode_most_and_how_rows_are_ordered(gfor):
+    """The load that moves damping three times as much stands first, a resistance of 0 pu behind all others."""
+    names = ("load_7.scale", "load_9.scale", "R_transformer_1")
+    wanted = [part for name in names for part in ("--parameter", f"grid.{name}")]
+    _, out, _ = gfor("sensitivities", "kundur", "--scenario", "pod_q", *wanted)
+    told, table = out[out.index("inter-area") :].split("┏")[0], out.split("┡")[1]
+    first = r"damping moves most with grid\.load_9\.scale \(-0\.1\d+\), grid\.load_7"
+    assert re.search(first, " ".join(told.split()))
+    assert "ordered by points per %, the largest first" in " ".join(told.split())
+    assert re.findall(r"grid\.\w+", table) == [
+        "grid.load_9",
+        "grid.load_7",
+        "grid.R_transformer_1",
+    ]
 
 
 @pytest.mark.parametrize(
