@@ -124,12 +124,11 @@ def _refuse_what_lacks(
     counted_once = [*count_repeats(problems, found.first_places)]
     listed = first_of(counted_once, _MOST_SHOWN, ("gfor new lists all with " + Option.DETAILS))
     shown = [*in_words(missing, found.labels), *listed]
-    raise InputError(
-        "the dynamics data cannot be taken over; correct them, or name models that may go in [units] dyr_leave_out ("
-        + command("new", (Option.DYR_LEAVE_OUT, "MODEL"))
-        + "):\n  "
-        + "\n  ".join(shown)
-    )
+    remedy = "correct them"
+    if problems or any(model.may_go for model in missing):
+        option = command("new", (Option.DYR_LEAVE_OUT, "MODEL"))
+        remedy += f", or name models that may go in [units] dyr_leave_out ({option})"
+    raise InputError(f"the dynamics data cannot be taken over; {remedy}:\n  " + "\n  ".join(shown))
 
 
 def _own_model(
