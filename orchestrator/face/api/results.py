@@ -332,7 +332,8 @@ class Run(NoTruth):
     def verdict(self) -> str:
         """The verdict in one sentence, as ``gfor run`` has it."""
         answer = answer_of_run.of_run(self.result)
-        return spelled(joined(": ", filter(None, (answer.verdict, answer.remark))))
+        told = joined("; ", filter(None, (answer.remark, answer.quiet_relays)))
+        return spelled(joined(": ", filter(None, (answer.verdict, told))))
 
     @property
     def linear(self) -> xr.Dataset | None:

@@ -60,7 +60,8 @@ def print_run(
     modes = [r.modes for r in results]
     faults = dict.fromkeys(fault.in_words for m in modes for fault in m.prepared.faults)
     answers = [of_run(r) for r in results]
-    print_answers(console, answers, modes, [*beside, *faults], details=details)
+    relays = [f"{one.subject}: {one.quiet_relays}" for one in answers if one.quiet_relays]
+    print_answers(console, answers, modes, [*beside, *faults, *relays], details=details)
     print_named_modes(console, modes)
     print_sources(console, modes)
     ring_downs = tables.ring_downs(results)

@@ -23,6 +23,7 @@ class ScenarioAnswer:
     after_swing: str = ""
     # ``mode`` where the events leave something switched; None where no mode is clearly the same
     became: Mode | None = None
+    quiet_relays: str = ""  # that no relay trips, and which came nearest; "" elsewhere
 
     def as_json(self) -> dict[str, Any]:
         mode = self.mode
@@ -35,6 +36,7 @@ class ScenarioAnswer:
             "damping_percent": percent,
             "components": _shares(mode),
             "remark": self.remark,
+            **({"quiet_relays": self.quiet_relays} if self.quiet_relays else {}),
         }
         if self.after is None:
             return found

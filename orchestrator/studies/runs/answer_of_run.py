@@ -58,7 +58,8 @@ KINDS = {
 
 def of_run(result: RunResult) -> ScenarioAnswer:
     """Return the answer of a run by what it showed, and by the eigenvalues before its events and after them."""
-    return _with_trips(_with_limits(_of_run(result), result), result)
+    answer = _with_trips(_with_limits(_of_run(result), result), result)
+    return replace(answer, quiet_relays=_of_quiet_relays(result))
 
 
 def _with_limits(answer: ScenarioAnswer, result: RunResult) -> ScenarioAnswer:
@@ -99,6 +100,24 @@ def _with_trips(answer: ScenarioAnswer, result: RunResult) -> ScenarioAnswer:
     if not told:
         return answer
     return replace(answer, remark="; ".join(filter(None, [*told, answer.remark])))
+
+
+def _of_quiet_relays(result: RunResult) -> str:
+    """Tell that no relay trips, and which came nearest, or that a code has nobody to trip; "" elsewhere."""
+    prepared = result.modes.prepared
+    if not prepared.relays:
+        code = prepared.case.table.protection
+        return f"{code} trips nobody: no converter is there that it protects" if code else ""
+    if result.trips:
+        return ""
+    nearest = result.nearest
+    if nearest is None:
+        return "no relay trips, none is beyond its limits"
+    who = f"{nearest.relay.record} of {nearest.relay.of}"
+    if nearest.decided:
+        return f"no relay trips by the end, but {who} would after it: its breaker is opening"
+    delay = nearest.relay.limits.delay
+    return f"no relay trips (nearest: {who}, {nearest.longest:.3g} of {delay:.3g} s)"
 
 
 def _of_kind(result: RunResult, kind: Kind) -> list[Finding]:

@@ -46,7 +46,7 @@ from orchestrator.studies.runs.after_events import modes_after
 from orchestrator.studies.runs.checkpoint_mark import computed
 from orchestrator.studies.runs.checkpoints import Checkpoints
 from orchestrator.studies.runs.ring_down import ring_down_of
-from orchestrator.systems.coupling.bus_relays import Trip
+from orchestrator.systems.coupling.bus_relays import Nearness, Trip
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.observers import Observer
 from orchestrator.systems.coupling.run_state import NOT_KEPT
@@ -86,6 +86,8 @@ class RunResult:
     # what the run did wrong, each said once, in the order of its beginning
     findings: list[Finding] = field(default_factory=list)
     trips: list[Trip] = field(default_factory=list)  # what relays did
+    # the relay that came nearest to a trip; None where none was beyond its limits
+    nearest: Nearness | None = None
     # what kept each foreign FMU from the rest of the machine, by component
     protections: dict[str, tuple[Protection, ...]] = field(default_factory=dict)
     after: ModesResult | str | None = None  # as `modes_after` has it
@@ -233,6 +235,7 @@ def _run(
         protections=protections,
         after=after,
         trips=trips,
+        nearest=relays.nearest,
     )
 
 

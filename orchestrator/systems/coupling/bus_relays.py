@@ -32,10 +32,11 @@ RATED_FREQUENCY = 50.0  # [Hz], where no component has one of its own
 
 _ROUND_OFF = 1e-6  # part of a step by which a sum of times may miss a communication point
 _GONE = 1e-9  # share of a load that counts as none
-_COLUMNS = 7
-_PICKED_UP, _DECIDED, _SEEN, _ANGLE, _SLIP, _OPENED, _SCALE = range(_COLUMNS)
+_COLUMNS = 8
+_PICKED_UP, _DECIDED, _SEEN, _ANGLE, _SLIP, _OPENED, _SCALE, _LONGEST = range(_COLUMNS)
 """Numbers of a relay in a run: times [s] at which it picked up, tripped, and had its events happen; what it saw when it
-tripped; angle [rad] and frequency beside the rated one [Hz]; scale of its load after it shed."""
+tripped; angle [rad] and frequency beside the rated one [Hz]; scale of its load after it shed; the longest time [s] that
+it counted beyond its limits, −∞ where it was never beyond."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +80,23 @@ class Trip:
     events: tuple[Event, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class Nearness:
+    """How near a relay came to a trip.
+
+    ``longest``: the longest time that it counted beyond its limits [s]; ``decided``: whether it tripped, be its breaker
+    open or not."""
+
+    relay: Relay
+    longest: float
+    decided: bool
+
+    @property
+    def share(self) -> float:
+        """Part of the relay's delay; 1 where it tripped."""
+        return 1.0 if self.decided else self.longest / self.relay.limits.delay
+
+
 class Relays:
     """All relays of a run: an observer that orders events.
 
@@ -97,6 +115,7 @@ class Relays:
         self._least = _ROUND_OFF * step_size
         self._state = np.full((len(self.relays), _COLUMNS), inf)
         self._state[:, [_SEEN, _ANGLE, _SLIP, _SCALE]] = 0.0
+        self._state[:, _LONGEST] = -inf
         self._looked: float | None = None  # time of the last look [s]
         limits = [relay.limits for relay in self.relays]
         self._low, self._high, self._delay = np.array(
@@ -123,6 +142,20 @@ class Relays:
                 time = float(opened[k])
                 found.append(Trip(self.relays[k], time, picked_up, decided, seen, events))
         return found
+
+    @property
+    def nearest(self) -> Nearness | None:
+        """Return the relay that came nearest to a trip, or tripped, of those that have something to trip.
+
+        None where none of them was beyond its limits."""
+        trips, longest = self.trips, self._state[:, _LONGEST]
+        decided = np.isfinite(self._state[:, _DECIDED])
+        found = [
+            Nearness(self.relays[k], float(longest[k]), bool(decided[k]))
+            for k in np.flatnonzero(np.isfinite(longest)).tolist()
+            if self._events_of(k, trips)
+        ]
+        return max(found, key=lambda one: one.share, default=None)
 
     def begin(self, run: ObservedRun, stop_index: int) -> None:
         """Find the voltages of the buses, each of which is read once for all of its relays."""
@@ -160,6 +193,7 @@ class Relays:
         lasted = np.where(beyond & forgets, time - since, -inf)
         for k in np.flatnonzero(~forgets & waits).tolist():
             since[k], lasted[k] = self._within_window(k, time, is_beyond=bool(beyond[k]))
+        self._state[:, _LONGEST] = np.maximum(self._state[:, _LONGEST], lasted)
         trips = beyond & (lasted >= self._delay - self._least)
         self._state[trips, _DECIDED] = time
         self._state[trips, _SEEN] = seen[trips]

@@ -113,7 +113,9 @@ def test_a_whole_run_decides_about_modes_near_zero_and_not_of_others_that_grow(
         "_by_response",
         lambda _: ScenarioAnswer("", True, "stable", None, "settles"),
     )
-    prepared = bare_scenario(events=(SimpleNamespace(time=0.5),), stop_time=stop)
+    prepared = bare_scenario(
+        events=(SimpleNamespace(time=0.5),), stop_time=stop, case=before.prepared.case
+    )
     modes = SimpleNamespace(prepared=prepared, modes=before.modes, model=before.model)
     found = answer_of_run.of_run(SimpleNamespace(after=after, modes=modes, trips=(), findings=()))
     assert found.good is good

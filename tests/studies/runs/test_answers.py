@@ -44,7 +44,10 @@ def result(findings=(), stable=True, events=(1.0,), failure=None, kind=None):
     mode = make_mode(-0.2 + 5j, shape / 1.64, shape, SPEEDS)
     case = SimpleNamespace(
         table=SimpleNamespace(
-            analysis=SimpleNamespace(modes={}), models=kind, emt=KindTable(step_size=1e-4)
+            analysis=SimpleNamespace(modes={}),
+            models=kind,
+            emt=KindTable(step_size=1e-4),
+            protection=None,
         )
     )
     # leaves nothing changed

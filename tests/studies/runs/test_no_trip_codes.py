@@ -4,6 +4,7 @@ import pytest
 
 from orchestrator.cases.case import load_case, with_protection
 from orchestrator.core.errors import CaseError
+from orchestrator.studies.runs.answer_of_run import of_run
 from orchestrator.studies.runs.run import run_scenario
 from orchestrator.systems.coupling.bus_relays import Relays
 from tests.support.mill import MACHINES, RAW, mill_case
@@ -39,11 +40,47 @@ def prepared(tmp_path):
 )
 def test_without_voltage_it_has_to_stay_for_so_long_in_all(faults, stop, time, prepared):
     """Below 0.25 pu for 0.32 s; the frequency of a bus without voltage stays what it was."""
-    found = [
-        (trip.relay.of, trip.relay.record, trip.time)
-        for trip in run_scenario(prepared(faults, stop)).trips
-    ]
+    result = run_scenario(prepared(faults, stop))
+    found = [(trip.relay.of, trip.relay.record, trip.time) for trip in result.trips]
     assert found == ([] if time is None else [("gfor2", "PRC-029", pytest.approx(time, abs=1e-9))])
+    quiet = "no relay trips (nearest: PRC-029 of gfor2, 0.3 of 0.32 s)"
+    assert of_run(result).quiet_relays == (quiet if time is None else "")
+
+
+def test_a_run_without_a_fault_says_that_no_relay_is_beyond_its_limits(prepared):
+    result = run_scenario(prepared(stop=0.2))
+    assert of_run(result).quiet_relays == "no relay trips, none is beyond its limits"
+
+
+def test_a_code_without_a_converter_says_that_it_trips_nobody(tmp_path):
+    case = with_protection(load_case(mill_case(tmp_path)), "prc029")
+    (ready,) = case.prepare(["base"], None, None, 0.2)
+    told = of_run(run_scenario(ready)).quiet_relays
+    assert told == "prc029 trips nobody: no converter is there that it protects"
+
+
+def test_a_relay_whose_breaker_opens_after_the_end_is_named(prepared):
+    """Planted: it decides 0.05 s after the fault, and the run ends before the 2 s of its breaker."""
+    late = "1 'VTGTPAT' 2 2 '1' 0.8 9 0.05 2"
+    result = run_scenario(prepared([fault(1.0, 0.2)], 1.5, records=[late]))
+    assert result.trips == []
+    told = of_run(result).quiet_relays
+    assert told.startswith("no relay trips by the end, but VTGTPAT of gfor2 would after it")
+
+
+def test_the_command_says_below_its_table_that_nothing_trips(tmp_path, gfor):
+    file = mill_case(tmp_path, events=[fault(1.0, 0.3)], replace=("2",))
+    asked = ("run", file, "--scenario", "tried", "--stop", "1.5", "--protection", "prc029")
+    code, out, error = gfor(*asked, "--no-csv", "--out", tmp_path / "out")
+    assert code == 0, error
+    assert "no relay trips (nearest: PRC-029 of gfor2" in out
+
+
+def test_a_unit_that_is_off_comes_near_no_trip(prepared):
+    """Its relay sees the fault as well, and has nothing to trip."""
+    off = {"type": "unit_trip", "unit": "gfor2", "time": 0.5}
+    result = run_scenario(prepared([off, fault(1.0, 0.2)], 1.5))
+    assert (result.trips, result.nearest) == ([], None)
 
 
 def test_what_lies_further_back_than_the_window_counts_no_more(prepared):
