@@ -50,6 +50,7 @@ _COUPLING_RATE = 1.0  # [1/s]
 # up to this number of states, all eigenvectors cost less than a search for one
 _DENSE_VECTORS = 200
 _STATES_NAMED = 3
+_STATES_KEPT = 6  # in JSON, those that take part most
 _SWINGS_SHOWN = 3
 
 
@@ -187,6 +188,19 @@ class Stability(NoTruth):
         """Largest real part [1/s] of the whole spectrum, zeros left out."""
         return None if self.mode is None else self.mode.eigenvalue.real
 
+    @property
+    def participation(self) -> tuple[tuple[str, float], ...]:
+        """State and participation factor in the mode, the largest first.
+
+        In the drift of the common speed these are the machines' speeds alone: all angles and network states follow
+        them, and their factors, of a mode close to that of the free angle, tell of no cause."""
+        if self.mode is None:
+            return ()
+        told = self.mode.participation
+        if self.common_speed:
+            return tuple(one for one in told if one[0] in self.common_speed)
+        return told
+
     def doubted(self, misfits: Iterable[str]) -> "Stability":
         """Not known to be stable where something does not fit between devices and bindings; growth stays growth."""
         what = "; ".join(misfits)
@@ -239,9 +253,7 @@ class Stability(NoTruth):
     def as_json(self) -> dict[str, Any]:
         """Figures and sentence as JSON's types; rates in 1/s, frequencies in Hz."""
         mode = self.mode
-        participation = (
-            [] if mode is None else [{"state": s, "factor": f} for s, f in mode.participation[:6]]
-        )
+        participation = [{"state": s, "factor": f} for s, f in self.participation[:_STATES_KEPT]]
         return {
             "stable": self.stable,
             "largest_growth_rate": self.largest_growth_rate,

@@ -518,6 +518,22 @@ def test_stability_is_lost_beyond_the_sliders_range_and_said_in_the_sweeps_words
 
 
 @needs_chromium
+def test_a_drift_of_the_common_speed_is_told_as_one(view):
+    """And growth of another kind by the components of the states that take part most."""
+    verdict = {
+        "largest_growth_rate": 0.0213,
+        "frequency_hz": 0,
+        "participation": [{"state": "sg1.omega", "factor": 0.6}],
+        "common_speed": ["sg1.omega", "sg2.omega"],
+        "sentence": "",
+    }
+    told = view.evaluate("verdict => growthOf(verdict)", verdict)
+    assert told == "the common speed drifts at +0.021 1/s without a governor, all machines alike"
+    other = view.evaluate("verdict => growthOf(verdict)", verdict | {"common_speed": []})
+    assert other == "a mode grows at +0.021 1/s (no oscillation, in sg1)"
+
+
+@needs_chromium
 def test_a_refused_outage_and_a_search_that_cannot_act_say_so(browser):
     with served("two_area", "gfor") as explorer, opened(browser, explorer.address) as view:
         before = view.locator("#verdict").inner_text()

@@ -109,6 +109,10 @@ def test_a_drift_without_a_governor_is_told(case, scenario):
     assert (answer.good, answer.verdict) == (False, "UNSTABLE")
     assert answer.remark.startswith("swings damped; the common speed drifts (+0.0")
     assert answer.remark.count("no governor") == 1
+    told = result.stability.as_json()  # of Kundur's system a bus voltage once stood first
+    own = dict(result.stability.mode.participation)
+    speeds = sorted(told["common_speed"], key=own.get, reverse=True)
+    assert told["participation"] == [{"state": name, "factor": own[name]} for name in speeds]
 
 
 def test_a_verdict_names_the_speeds_and_stays_one_of_growth():
@@ -119,6 +123,7 @@ def test_a_verdict_names_the_speeds_and_stays_one_of_growth():
         "(sg1.omega, sg2.omega); cause: the system"
     )
     assert verdict.as_json()["stable"] is False
+    assert [row["state"] for row in verdict.as_json()["participation"]] == list(SPEEDS)
     besides = replace(verdict, growing=2)
     assert not besides.only_common_speed
     assert "damped" not in besides.sentence()

@@ -130,8 +130,9 @@ function nearBy(name, percent) {
   return Number.isFinite(x) && x >= (one.minimum ?? -Infinity) && x <= (one.maximum ?? Infinity) && x * one.value > 0 ? x : null;
 }
 // What grows, in a few words: how fast, at which frequency, and in which components.
-function growthOf({ largest_growth_rate: rate, frequency_hz: hertz, participation, sentence }) {
+function growthOf({ largest_growth_rate: rate, frequency_hz: hertz, participation, common_speed, sentence }) {
   if (rate === null || !participation.length) return sentence;
+  if (common_speed.length) return `the common speed drifts at ${signed(rate, 2)} 1/s without a governor, all machines alike`;
   const where = [...new Set(participation.slice(0, 3).map(one => one.state.split(".")[0]))].join(" and ");
   return `a mode grows at ${signed(rate, 2)} 1/s (${hertz ? `${number(hertz, 3)} Hz` : "no oscillation"}, in ${where})`;
 }
