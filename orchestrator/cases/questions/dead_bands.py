@@ -17,7 +17,7 @@ class DeadBand:
     """Ends of a dead band, and what of its loop acts beyond it.
 
     ``ends``: one that counts for both sides, or the lower and the upper; ``gains``: one at least is not 0 where the
-    loop acts; ``switch``: it must be on as well."""
+    loop acts; ``switch``: it must be there and on as well."""
 
     ends: tuple[str, ...]
     gains: tuple[str, ...]
@@ -30,7 +30,9 @@ class DeadBand:
         gains = [value_of(plan, f"{scope}{gain}") for gain in self.gains]
         if not any(gains) or not 0 < min(widths) < _NEVER_LEFT:
             return False
-        return not self.switch or bool(plan.number(f"{scope}{self.switch}"))
+        switch = f"{scope}{self.switch}"
+        is_known = switch in plan.description.variables
+        return not self.switch or (is_known and bool(plan.value(switch)))
 
 
 _OF_GOVERNOR = "the governor's answer to the speed"
@@ -38,13 +40,17 @@ _OF_PLANT = (
     DeadBand(("dbd1", "dbd2"), ("Kp", "Ki"), "the plant's control of voltage or Q"),
     DeadBand(("fdbd1", "fdbd2"), ("Ddn", "Dup"), "the plant's answer to frequency", "Fflag"),
 )
+_OF_DISTRIBUTED = DeadBand(
+    ("fdbd1", "fdbd2"), ("Ddn", "Dup"), "the answer to frequency", "FreqFlag"
+)
 _BANDS = {
     "governor.": (
         DeadBand(("db",), ("K_pgov", "K_igov", "K_P", "K_I"), _OF_GOVERNOR),
         DeadBand(("db_1",), ("K", "K_P", "K_I"), _OF_GOVERNOR),
     ),
     "plant.": _OF_PLANT,
-    "": _OF_PLANT,  # a controller of several units is a component of its own
+    # a controller of several units is a component of its own, and so is distributed generation
+    "": (*_OF_PLANT, _OF_DISTRIBUTED),
 }
 """By the scope of their parameters in a component."""
 

@@ -2,8 +2,10 @@
 
 import pytest
 
+from orchestrator.cases.case import load_case
 from tests.cases.networks.psse.test_dyr_following import dyr, prepared
 from tests.cases.networks.psse.test_dyr_plants import PLANT
+from tests.support.mill import mill_case
 
 __all__ = ["prepared"]  # the fixture
 WIDE = "0.1 -0.1 -1 1 0.43 -0.43 1 0.05 0.25 -1 1 "
@@ -45,3 +47,19 @@ def test_a_plants_dead_band_is_asked_about_with_the_command_that_shows_its_loop(
 )
 def test_a_dead_band_that_hides_no_loop_is_not_asked_about(prepared, Q, f, flags):
     assert asked(prepared, (Q, f), flags) == []
+
+
+@pytest.mark.parametrize(("FreqFlag", "number"), [(0, 0), (1, 1)])
+def test_distributed_generation_is_asked_about_where_it_answers_to_frequency(
+    tmp_path, FreqFlag, number
+):
+    """DER_A has names of a plant's dead band, and another switch."""
+    record = (
+        f"1 'GENCLS' 1 0 0 /\n2 'DERA1' 1 1 {FreqFlag} 0 1 1 1 0.02 0.02 -99 99 0 0 0.02 0.02 20 20 -0.0006 0.0006 "
+        "99 -99 1.1 0 0.5 -0.5 0.02 0.1 10 1.2 0.2 0.85 1.2 1.15 0.16 0.16 0.16 2 0.5 56.5 62 0.16 0.16 0.02 2 0.02 "
+        "0.3 1 -1 /\n"
+    )
+    (ready,) = load_case(mill_case(tmp_path, machines=record)).prepare(["base"])
+    texts = [q.text for q in ready.questions if "dead band" in q.text]
+    assert len(texts) == number
+    assert all("--set gfor2.fdbd1=0 --set gfor2.fdbd2=0" in text for text in texts)
