@@ -32,6 +32,7 @@ from orchestrator.studies.validation.plant_out_of_step import plant_loss
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.record import PortBases, Recording, questions_of_level
 from orchestrator.studies.validation.setpoint import ask_of_setpoint, without_step
+from orchestrator.studies.validation.smoothed import ask_of_smoothing
 from orchestrator.studies.validation.windows import Windows, find_windows
 
 _SHORTEST_BEFORE = 0.1  # a window before the event [s] that shows a steady state
@@ -144,6 +145,7 @@ def prepare_event(
         asked.append(Question(QuestionKind.FRAMES, figures))
     asked += questions_of_level(recording, abs(voltage), start.power, bases)
     asked += _of_windows(recording, windows, before)
+    asked += ask_of_smoothing(recording, windows)
     unique = {one.kind: one for one in reversed(asked)}
     return RecordedEvent(recording, windows, start, tuple(reversed(unique.values())))
 

@@ -249,6 +249,15 @@ def _power_held(x: Figures) -> str:
     )
 
 
+def _smoothed_event(x: Figures) -> str:
+    return (
+        f"from {x['at']:.4g} s on the voltage leaves its steady state little by little, as behind a filter that passes "
+        f"about {x['hertz']:.2g} Hz, though its samples would show {x['fastest']:.3g} Hz: did the recorder filter it, "
+        "and P and Q with it? What a model does wrong faster than that is hidden, and the event seems to begin early: "
+        "no window brings that back. Give the recording as it was measured"
+    )
+
+
 def _spike(x: Figures) -> str:
     return (
         f"{x['column']!r} leaves both samples beside it by {x['jump']:.3g} pu at {x['at']:g} s: is that a fault of the "
@@ -306,6 +315,7 @@ RECORDER_SENTENCES: Mapping[QuestionKind, Sentence] = {
     QuestionKind.STORED_TWICE: _stored_twice,
     QuestionKind.STUCK: _stuck,
     QuestionKind.POWER_HELD: _power_held,
+    QuestionKind.SMOOTHED: _smoothed_event,
     QuestionKind.SPIKE: _spike,
     QuestionKind.CLIPPED: _clipped,
     QuestionKind.MAGNITUDE: _magnitude,
