@@ -333,7 +333,7 @@ class Run(NoTruth):
         """The verdict in one sentence, as ``gfor run`` has it."""
         answer = answer_of_run.of_run(self.result)
         told = joined("; ", filter(None, (answer.remark, answer.quiet_relays)))
-        return spelled(joined(": ", filter(None, (answer.verdict, told))))
+        return spelled(joined(": ", filter(None, (answer.word, told))))
 
     @property
     def linear(self) -> xr.Dataset | None:

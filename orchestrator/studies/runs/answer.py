@@ -23,7 +23,13 @@ class ScenarioAnswer:
     after_swing: str = ""
     # ``mode`` where the events leave something switched; None where no mode is clearly the same
     became: Mode | None = None
+    but: str = ""  # what does not hold although the verdict is good, as "motor5 stalls"
     quiet_relays: str = ""  # that no relay trips, and which came nearest; "" elsewhere
+
+    @property
+    def word(self) -> str:
+        """The verdict, with what does not hold although it is good."""
+        return f"{self.verdict}, but {self.but}" if self.but else self.verdict
 
     def as_json(self) -> dict[str, Any]:
         mode = self.mode
@@ -36,6 +42,7 @@ class ScenarioAnswer:
             "damping_percent": percent,
             "components": _shares(mode),
             "remark": self.remark,
+            **({"but": self.but} if self.but else {}),
             **({"quiet_relays": self.quiet_relays} if self.quiet_relays else {}),
         }
         if self.after is None:

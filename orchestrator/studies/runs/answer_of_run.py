@@ -59,7 +59,8 @@ KINDS = {
 def of_run(result: RunResult) -> ScenarioAnswer:
     """Return the answer of a run by what it showed, and by the eigenvalues before its events and after them."""
     answer = _with_trips(_with_limits(_of_run(result), result), result)
-    return replace(answer, quiet_relays=_of_quiet_relays(result))
+    but = _lost(result) if answer.good else ""
+    return replace(answer, but=but, quiet_relays=_of_quiet_relays(result))
 
 
 def _with_limits(answer: ScenarioAnswer, result: RunResult) -> ScenarioAnswer:
@@ -100,6 +101,22 @@ def _with_trips(answer: ScenarioAnswer, result: RunResult) -> ScenarioAnswer:
     if not told:
         return answer
     return replace(answer, remark="; ".join(filter(None, [*told, answer.remark])))
+
+
+def _lost(result: RunResult) -> str:
+    """Tell of motors that stall and DC lines that are off at the end, which no verdict counts; "" elsewhere.
+
+    A DC line that is blocked in a fault and comes back is as its control is meant."""
+    motors = [one.component for one in _of_kind(result, STALL)]
+    interrupted = [one for one in _of_kind(result, INTERRUPTION) if one.until is None]
+    lines = list(dict.fromkeys(one.component for one in interrupted))
+    told = []
+    if motors:
+        told.append(f"{motors[0]} stalls" if len(motors) == 1 else f"{len(motors)} motors stall")
+    if lines:
+        several = f"{len(lines)} DC lines are off at the end"
+        told.append(several if lines[1:] else f"the DC line of {lines[0]} is off at the end")
+    return " and ".join(told)
 
 
 def _of_quiet_relays(result: RunResult) -> str:

@@ -58,7 +58,7 @@ def answers_table(
         f"Least damped mode from {low:g} to {high:g} Hz{when}: who swings; remark", overflow="fold"
     )
     for k, answer in enumerate(answers):
-        word = Text(answer.verdict, style=f"bold {OF_VERDICTS[answer.good]}")
+        word = Text(answer.word, style=f"bold {OF_VERDICTS[answer.good]}")
         modes = [mode for mode in (answer.mode, answer.became) if mode]
         figures = _figures(modes, theirs.get(k))
         table.add_row(answer.subject, word, *figures, short(answer.remark, LONGEST_REMARK))

@@ -13,6 +13,7 @@ from orchestrator.cases.form.schema import KindTable
 from orchestrator.face.cli import main
 from orchestrator.linear.spectra.modes import make_mode
 from orchestrator.linear.spectra.stability import Hidden, Stability
+from orchestrator.output.report.html.verdict_lines import VerdictLine
 from orchestrator.output.report.short_texts import LONGEST_REMARK
 from orchestrator.simulation.watch.finding import Finding
 from orchestrator.studies.runs.answer_of_modes import of_modes
@@ -113,6 +114,32 @@ def test_the_verdict_of_a_run_is_its_own(findings, stable, word, remark):
         assert of_run(result(findings, stable, kind="phasor")).remark.endswith(
             "repeat with --set models=emt"
         )
+
+
+@pytest.mark.parametrize(
+    ("findings", "but"),
+    [
+        ([finding("stall")], "gfor stalls"),
+        ([finding("stall"), finding("stall")], "2 motors stall"),
+        ([finding("interruption")], "the DC line of gfor is off at the end"),
+        ([finding("interruption", until=2.0)], ""),  # it comes back
+        (
+            [finding("stall"), finding("interruption")],
+            "gfor stalls and the DC line of gfor is off at the end",
+        ),
+        ([finding("stall"), finding("run_away")], ""),  # it is UNSTABLE already
+    ],
+)
+def test_a_good_verdict_names_what_does_not_hold(findings, but):
+    """The first words of a table, of Python and of a report say it; the verdict of JSON stays what it was."""
+    answer = of_run(result(findings))
+    words = "stable, but " + but if but else answer.verdict
+    assert answer.word == words
+    assert answer.as_json()["verdict"] in ("stable", "UNSTABLE")
+    (cell,) = answers_table([answer], (0.1, 2.0)).columns[1].cells
+    assert str(cell) == words
+    line = VerdictLine.of({"name": "S", "answer": answer.as_json()})
+    assert line.words.startswith(f"S: {words}, least damped")
 
 
 def test_a_long_remark_is_whole_in_json_and_short_in_the_table():

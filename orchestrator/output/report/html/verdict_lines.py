@@ -40,6 +40,7 @@ class VerdictLine:
         answer = scenario.get("answer") or {}
         stability = scenario.get("stability") or {}
         stable = answer.get("stable", stability.get("stable", scenario.get("stable")))
+        verdict = answer.get("verdict") or VERDICTS[stable]
         listed = scenario.get("modes")
         modes = listed if isinstance(listed, list) else [answer]
         judged = [mode for mode in modes if mode.get("damping_percent") is not None]
@@ -47,7 +48,7 @@ class VerdictLine:
         return cls(
             scenario=scenario.get("subject") or scenario.get("title", scenario["name"]),
             stable=stable,
-            verdict=answer.get("verdict") or VERDICTS[stable],
+            verdict=", but ".join(filter(None, (verdict, answer.get("but")))),
             remark=short(answer.get("remark") or "", LONGEST_REMARK),
             least=_mode(least),
             after=_mode(answer.get("after_events")),
