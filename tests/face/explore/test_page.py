@@ -518,6 +518,28 @@ def test_stability_is_lost_beyond_the_sliders_range_and_said_in_the_sweeps_words
 
 
 @needs_chromium
+def test_a_question_that_another_one_overtook_is_no_longer_counted(view):
+    """A newer one of the same name is; the header counted a search of 2 s up to 103 s."""
+    at_work = view.locator("#work")
+    view.evaluate(
+        """() => {
+            const asked = window.fetch, held = [];
+            window.fetch = (place, given) => JSON.parse(given.body).ask === "held"
+                ? new Promise(answer => held.push(answer)) : asked(place, given);
+            window.begin = () => ask("search", { ask: "held" });
+            window.overtake = () => held.shift()({ ok: true, json: async () => ({ superseded: true }) });
+        }"""
+    )
+    view.evaluate("() => { window.first = begin(); }")
+    assert "search … " in at_work.inner_text()
+    view.evaluate("async () => { overtake(); await first; }")
+    assert "search" not in at_work.inner_text()
+    view.evaluate("() => { window.older = begin(); }")
+    view.evaluate("async () => { begin(); overtake(); await older; }")
+    assert "search … " in at_work.inner_text()
+
+
+@needs_chromium
 def test_a_drift_of_the_common_speed_is_told_as_one(view):
     """And growth of another kind by the components of the states that take part most."""
     verdict = {

@@ -102,9 +102,9 @@ async function ask(what, question, place = null) {
   } catch {
     found = { error: "the server does not answer; it ended, or was ended by Ctrl-C: start gfor explore again" };
   }
+  const newer = atWork.has(what) && atWork.get(what) !== mine;  // of this name: it goes on being counted
+  if (!newer) { working(what, false); delete seen.timing[`said ${what}`]; }
   if (found.superseded) return undefined;
-  if (atWork.get(what) === mine) working(what, false);
-  delete seen.timing[`said ${what}`];
   if (found.cancelled || found.closed) { failed("the computation was cancelled; the figures are those before it", place); return null; }
   if (found.error) { failed(found.error, place); return null; }
   seen.timing[what] = (performance.now() - begin) / 1000;
