@@ -495,6 +495,43 @@ def test_a_value_with_a_wanted_damping_is_found(view, capsys):
 
 
 @needs_chromium
+@pytest.mark.parametrize(
+    ("slope", "bend", "found", "told"),
+    [
+        (1.17e-3, 0, None, "not tried above 1100: by the slope there 10 % lies near 9800, far out"),
+        (-1.17e-3, 0, None, "not tried above 1100: the slope there does not lead to 10 %"),
+        (5e-3, 0, 2300, "not tried below"),
+        (1.17e-3, 2e-6, 2123, "not tried below"),  # the slope at its own value leads far out
+    ],
+)
+def test_a_search_ends_where_the_slope_leads_far_out(view, slope, bend, found, told):
+    """Of a damping of −1.5 % + slope·K + bend·K², at K = 200: to the sliders' ends, and on while it leads to 10 %."""
+    control = add(view, "gfor.pod_p.K")
+    view.evaluate(
+        """([slope, bend]) => {
+            window.tried = [];
+            ask = async (what, question) => {
+                const K = question.values["gfor.pod_p.K"] ?? 200;
+                if (what === "search") tried.push(K);
+                const damping_percent = -1.5 + slope * K + bend * K * K;
+                const stability = { largest_growth_rate: 1, participation: [], sentence: "" };
+                const modes = [{ damping_percent }], stable = damping_percent >= 0;
+                return { idle: {}, modes: { scenarios: [{ stable, stability, modes }] } };
+            };
+        }""",
+        [slope, bend],
+    )
+    view.evaluate("seen.finders['pod_p gfor.pod_p.K'].search(10, false)")
+    said = control.locator(".finder [role=status]").inner_text()
+    assert told in said
+    if found is None:
+        assert said.startswith("not reached; nearest: ")
+        assert max(view.evaluate("tried")) == 1100
+    else:
+        assert float(re.match(r"10\.00 % at K (\S+);", said)[1]) == pytest.approx(found, abs=2)
+
+
+@needs_chromium
 def test_stability_is_lost_beyond_the_sliders_range_and_said_in_the_sweeps_words(browser):
     with served("two_area", "gfor") as explorer, opened(browser, explorer.address) as view:
         control = add(view, "grid.X_L")

@@ -104,6 +104,8 @@ function controlOf(name, mover = null) {
 // -- a value that is looked for -----------------------------------------------------------------------------------
 
 const LADDER = [1.3, 1.7, 2.3, 3, 4, 5.5, 8, 12, 25, 100], HALVES_TO_AN_EDGE = 5;
+// How many values of the ladder are tried in any case, a little beyond the slider's ends, and which one is far out.
+const TRIED_FIRST = LADDER.indexOf(5.5) + 1, FAR_OUT = LADDER.indexOf(25);
 const reasonOf = text => { const reason = (text.split("\n")[1] ?? text).replace(/^\s*- /, ""); return reason.length > 200 ? `${reason.slice(0, 200)} …` : reason; };
 // Values that are tried upwards and downwards of `now`: in growing ratios, or steps where it is not above 0, and the
 // bounds; without a declared one, a value above 0 goes down to a part of itself.
@@ -115,7 +117,14 @@ function ladders(now, least, most) {
   const within = (values, bound) => [...values.map(x => +x.toPrecision(6)).filter(x => x > least && x < most), ...(Number.isFinite(bound) && bound !== now ? [bound] : [])];
   return [within(up, most), within(down, least)];
 }
-// Looks for all values at which the least damped mode of the range reaches so many percent, or stability is lost: the
+// Why a side of a search goes no further, by the slope between its last two values; "" where it may meet the damping.
+function whyNoFurther({ before, last, far }, percent) {
+  const x = last.x - last.f * (last.x - before.x) / (last.f - before.f), way = Math.sign(last.x - before.x);
+  if (!Number.isFinite(x) || way * (x - last.x) <= 0) return `the slope there does not lead to ${number(percent)} %`;
+  return way * (x - far) > 0 ? `by the slope there ${number(percent)} % lies near ${number(x, 2)}, far out` : "";
+}
+// Looks for values at which the least damped mode of the range reaches so many percent, beyond the slider only as far as
+// the slope leads there, or at which stability is lost, to the ends: the
 // smallest change first (the smallest ratio, where it is stability), which a damping also sets. `spec`: what it is `now`, its `bounds`, `valuesAt`, which makes the case's values from one number,
 // `apply`, which sets one, and its `words`. One per key, so that what was found stays while the controls are painted anew.
 function finderOf(key, spec) {
@@ -184,16 +193,21 @@ function finder({ now, bounds, valuesAt, apply, words }) {
       if (crossings.length === 1 && !stopped) tell(`${text(found)}; others are looked for …`);
     };
     // Upwards and downwards in turn, so that the nearest comes first; what changes between neighbours is found at once.
-    const sides = ladders(here, least, most).map(values => ({ values, last: first }));
+    const sides = ladders(here, least, most).map((values, down) => ({ values, last: first, done: 0, far: (here > 0 && down ? null : values[FAR_OUT]) ?? values.at(-1) }));
     const walk = async (side, x) => {
       const point = await at(x), before = side.last;
-      if (point) { side.last = point; if (point.f < 0 !== before.f < 0) await crossingIn(before, point); }
+      if (point) { Object.assign(side, { before, last: point }); if (point.f < 0 !== before.f < 0) await crossingIn(before, point); }
       return point;
     };
     while (sides.some(side => side.values.length)) for (const side of sides.filter(one => one.values.length)) {
       const x = side.values.shift(), point = await walk(side, x);
       if (stopped) { say(stopped); return; }
-      if (point) continue;
+      if (point) {
+        side.done += 1;
+        const why = percent !== null && side.done >= TRIED_FIRST && side.values.length ? whyNoFurther(side, percent) : "";
+        if (why) { edges.push(`not tried ${x > here ? "above" : "below"} ${number(x)}: ${why}`); side.values = []; }
+        continue;
+      }
       let edge = { x, why: error.textContent };
       for (let k = 0; k < HALVES_TO_AN_EDGE; k++) {
         const middle = +((side.last.x + edge.x) / 2).toPrecision(6), beside = await walk(side, middle);
