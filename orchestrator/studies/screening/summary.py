@@ -65,6 +65,34 @@ def least_of(item: ScreenedItem) -> ModeAt | None:
 
 
 @dataclass(frozen=True)
+class SwingAbove:
+    """The least damped swing of machines above the range at an item, and who takes part most in it."""
+
+    item: ScreenedItem
+    frequency: float  # [Hz]
+    damping: float  # [%]
+    who: str
+
+    @classmethod
+    def of(cls, item: ScreenedItem) -> "SwingAbove | None":
+        """Read it from an item's record; None where no swing was found there."""
+        if item.record.above is None:
+            return None
+        value = complex(*item.record.above)
+        hertz = value.imag / (2 * np.pi)
+        return cls(item, hertz, damping_percent(value), item.record.who_above)
+
+
+def less_damped_above(item: ScreenedItem, wanted: float) -> SwingAbove | None:
+    """Return the swing above the range where it is damped less than all within it, and less than what is wanted.
+
+    ``wanted``: damping [%] below which modes are critical."""
+    above, least = SwingAbove.of(item), least_of(item)
+    within = wanted if least is None else least.damping
+    return above if above is not None and above.damping < within else None
+
+
+@dataclass(frozen=True)
 class ScreenedMode:
     name: str
     worst: ModeAt
@@ -146,6 +174,12 @@ class Summary:
     def least_damped(self) -> list[ModeAt]:
         """The least damped critical mode of every item that has one, the worst first."""
         return sorted(filter(None, map(least_of, self.result.items)), key=lambda mode: mode.damping)
+
+    def least_above(self) -> SwingAbove | None:
+        """The least damped swing of machines above the range, of all items; None where none was found."""
+        computed = (one for one in self.result.items if one.record.status is Status.COMPUTED)
+        found = filter(None, map(SwingAbove.of, computed))
+        return min(found, key=lambda swing: swing.damping, default=None)
 
     def _modes(self) -> list[ScreenedMode]:
         followed: dict[int, list[ModeAt]] = {}

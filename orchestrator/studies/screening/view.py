@@ -28,7 +28,7 @@ from orchestrator.output.report.html.charts import (
     line_chart,
 )
 from orchestrator.output.report.html.elements import SHADES, Figures, document
-from orchestrator.output.report.mode_tables import damping, eigenvalue_text
+from orchestrator.output.report.mode_tables import LEAST_DAMPING, damping, eigenvalue_text
 from orchestrator.output.report.notebook import page
 from orchestrator.output.report.short_texts import kinds_of
 from orchestrator.output.results.file_writers import save_json
@@ -49,6 +49,7 @@ from orchestrator.studies.screening.summary import (
     Summary,
     duration,
     least_of,
+    less_damped_above,
     where,
 )
 from orchestrator.studies.screening.trips import run_columns, runs_json, runs_table
@@ -272,7 +273,6 @@ def overview(summary: Summary, most: int = 12) -> ColumnTable[OutageRow]:
     plan, rows = summary.result.plan, by_outage(summary)
     at = {(item.outage.name, item.point.name): item for item in summary.result.items}
     title = "Least damping [%], worst outage first"
-    above = f"> {100 * plan.wanted.damping:g}"
     columns = [Column[OutageRow]("Outage", lambda row: row.name)]
     prepared = plan.prepared
     out = {one.name: tuple(map(line_of, one.elements)) for one in plan.outages}
@@ -281,7 +281,7 @@ def overview(summary: Summary, most: int = 12) -> ColumnTable[OutageRow]:
     texts = len(columns)
 
     def cell(item: ScreenedItem | None) -> str | Marked:
-        return _cell(item, above)
+        return _cell(item, 100 * plan.wanted.damping)
 
     def at_point(name: str) -> Column[OutageRow]:
         return Column(name, lambda row: at.get((row.name, name)), cell)
@@ -332,14 +332,20 @@ def _who(mode: ModeAt | None) -> str:
     return f"{mode.frequency:.2f} Hz ({', '.join(name for name, _ in mode.participation(2))})"
 
 
-def _cell(item: ScreenedItem | None, above: str) -> str | Marked:
-    """The least damping at an item, or what became of it; ``above`` where it has no critical mode."""
+def _cell(item: ScreenedItem | None, wanted: float) -> str | Marked:
+    """The least damping at an item [%], or what became of it, and that of a swing above the range that has less.
+
+    ``wanted``: damping [%] below which modes are critical."""
     if item is None or item.record.status is not Status.COMPUTED:
         return "–" if item is None else str(item.record.status)
-    least = least_of(item)
+    least, above = least_of(item), less_damped_above(item, wanted)
     if item.record.stable is False:
         return Marked(f"{least.damping:.2f} UNSTABLE" if least else "UNSTABLE", "bad")
-    return above if least is None else damping(least.damping)
+    if above is None:
+        return f"> {wanted:g}" if least is None else damping(least.damping)
+    within = f"> {wanted:g}" if least is None else f"{least.damping:.2f}"
+    text = f"{within}; {above.frequency:.2f} Hz above the range: {above.damping:.2f}"
+    return Marked(text, "bad") if above.damping < LEAST_DAMPING else text
 
 
 def no_modes(summary: Summary) -> str:

@@ -1,7 +1,6 @@
 """A screening in words: its verdict, what it rests on, what it could not judge, and its outages, worst first."""
 
 import fnmatch
-import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,7 +9,6 @@ import numpy as np
 
 from orchestrator.core.options import Option, command
 from orchestrator.linear.spectra.critical_modes import DENSE
-from orchestrator.linear.spectra.modes import damping_percent
 from orchestrator.linear.spectra.shifted_equations import GROWING
 from orchestrator.linear.spectra.stability import zeros_in_words
 from orchestrator.output.report.verdict_sentence import VerdictSentence
@@ -191,10 +189,7 @@ def verdict_of(summary: Summary) -> VerdictSentence:
         )
         return VerdictSentence(False, "UNSTABLE", f"{text}{lost}")
     computed = summary.counts[Status.COMPUTED]
-    least = summary.least_damped()[:1]
-    tail = (
-        f"; least damped: {where(summary, least[0].item)}{_least(least[0].item)}" if least else ""
-    )
+    tail = _least_of_all(summary)
     if summary.free:
         first = summary.free[0]
         zeros = zeros_in_words(first.record.zeros)
@@ -223,6 +218,21 @@ def verdict_of(summary: Summary) -> VerdictSentence:
     missing += [f"what relays leave at {tripping} of them is not judged"] if tripping else []
     known = f"nothing grows at {counted_items(computed, total, planned)}, but " if computed else ""
     return VerdictSentence(None, "not known", f"{known}{', '.join(missing)}{tail}")
+
+
+def _least_of_all(summary: Summary) -> str:
+    """Tell the least damped critical mode, and a swing of machines above the range that is damped less."""
+    wanted, above = summary.result.plan.wanted, summary.least_above()
+    least = next(iter(summary.least_damped()), None)
+    text = f"{where(summary, least.item)}{_least(least.item)}" if least else ""
+    if above is None or above.damping >= (least.damping if least else 100 * wanted.damping):
+        return f"; least damped: {text}" if text else ""
+    figures = f"{above.frequency:.3f} Hz, {above.damping:.2f} % ({above.who})"
+    told = f"{where(summary, above.item)}: {figures}"
+    end = f"{wanted.highest_hz:g} Hz"
+    if not text:
+        return f"; least damped, above {end}: {told}"
+    return f"; least damped up to {end}: {text}, and LESS above: {told}"
 
 
 def what_was_counted(summary: Summary) -> str:
@@ -261,17 +271,11 @@ def above_the_range(summary: Summary) -> str:
     if wanted.highest_hz >= LOCAL_HZ or not items:
         return ""
     typed = Option.RANGE + f" {wanted.lowest_hz:g}:{LOCAL_HZ:g}"
-    found = [
-        (damping_percent(complex(*one.record.above)), one)
-        for one in items
-        if one.record.above is not None
-    ]
-    least, worst = min(found, key=lambda entry: entry[0], default=(np.inf, items[0]))
-    if worst.record.above is not None and least < 100 * wanted.damping:
-        hertz = worst.record.above[1] / math.tau
+    least = summary.least_above()
+    if least is not None and least.damping < 100 * wanted.damping:
         return (
-            f"Not judged: above the range a machine swings at {hertz:.3f} Hz with {least:.2f} %: "
-            f"{where(summary, worst)} ({worst.record.who_above}); {typed} holds it."
+            f"Not judged: above the range a machine swings at {least.frequency:.3f} Hz with {least.damping:.2f} %: "
+            f"{where(summary, least.item)} ({least.who}); {typed} holds it."
         )
     if all(one.record.looked_above for one in items) or not _has_machines(plan):
         return ""

@@ -18,7 +18,7 @@ from orchestrator.studies.screening.record import ItemRecord
 from orchestrator.studies.screening.request import ScreeningRequest
 from orchestrator.studies.screening.study import plan_screening, run_screening
 from orchestrator.studies.screening.summary import Summary
-from orchestrator.studies.screening.view import as_json, remarks
+from orchestrator.studies.screening.view import as_json, overview, remarks
 from orchestrator.studies.screening.words import (
     above_the_range,
     by_outage,
@@ -283,6 +283,58 @@ def test_the_least_damped_swing_above_the_range_is_told(screened, looked, above,
     summary = Summary(replace(screened, items=items))
     assert above_the_range(summary) == said
     assert as_json(summary)["above_the_range"] == (said or None)
+
+
+def calm(screened, above, critical=(0,)):
+    """Return the summary of two points with one mode of 1.5 Hz and 9.5 %, the second with a swing above the range."""
+    one = ItemRecord(
+        Status.COMPUTED,
+        stable=True,
+        counted=True,
+        looked_above=True,
+        eigenvalues=np.array([-0.9 + 9.425j]),
+        critical=critical,
+        shares={"sg1": np.ones(1, dtype=np.float32)},
+    )
+    records = (one, replace(one, above=above, who_above="sg1"))
+    items = tuple(
+        replace(item, record=record, trajectories=(0,))
+        for item, record in zip(screened.items, records, strict=True)
+    )
+    return Summary(replace(screened, items=items))
+
+
+@pytest.mark.parametrize(
+    ("above", "critical", "said", "cell"),
+    [
+        (
+            (-0.01, 18.4),
+            (0,),
+            "; least damped up to 2 Hz: in, intact: 1.500 Hz, 9.51 % (sg1 1.00), "
+            "and LESS above: out, intact: 2.928 Hz, 0.05 % (sg1)",
+            "9.51; 2.93 Hz above the range: 0.05",
+        ),
+        (
+            (-0.83, 13.5),
+            (),
+            "; least damped, above 2 Hz: out, intact: 2.149 Hz, 6.14 % (sg1)",
+            "20; 2.15 Hz above the range: 6.14",
+        ),
+    ],
+    ids=["less than within", "nothing within"],
+)
+def test_a_swing_above_the_range_with_less_damping_stands_in_the_verdict_and_its_row(
+    screened, above, critical, said, cell
+):
+    summary = calm(screened, above, critical)
+    assert said in verdict_sentence(summary)
+    assert cell in overview(summary).html()
+
+
+def test_a_swing_above_the_range_with_more_damping_stands_in_neither(screened):
+    summary = calm(screened, (-2.0, 18.4))
+    assert "; least damped: in, intact: 1.500 Hz, 9.51 %" in verdict_sentence(summary)
+    assert "above the range" not in overview(summary).html()
 
 
 def test_a_small_system_is_searched_above_the_range(tmp_path):
