@@ -64,7 +64,6 @@ class Untold(StrEnum):
     WIDE = "wide"
     NO_BETTER = "no better than the start"
     INTERRUPTED = "interrupted"
-    ERROR_LEFT = "error left"
 
 
 @dataclass(frozen=True)
@@ -215,9 +214,7 @@ def fit_parameters(
         numbers = [_left_at_start(one) for one in numbers]
     parameters = [*_switches(best, searches, starts, residuals), *numbers]
     if not finished:
-        parameters = [_doubted(one, Untold.INTERRUPTED) for one in parameters]
-    elif _rms(best.errors) > _REACHED:
-        parameters = [_doubted(one, Untold.ERROR_LEFT) for one in parameters]
+        parameters = [_interrupted(one) for one in parameters]
     return Fit(
         parameters=parameters,
         fitted_to=[one.recording.label for one in events],
@@ -478,9 +475,9 @@ def _left_at_start(one: FittedParameter) -> FittedParameter:
     return replace(one, value=one.start, low=None, high=None, untold=Untold.NO_BETTER)
 
 
-def _doubted(one: FittedParameter, why: Untold) -> FittedParameter:
-    """A parameter that the fit as a whole does not tell; a reason of its own stays."""
-    return one if one.untold else replace(one, untold=why)
+def _interrupted(one: FittedParameter) -> FittedParameter:
+    """A parameter that an interrupted fit does not tell; a reason of its own stays."""
+    return one if one.untold else replace(one, untold=Untold.INTERRUPTED)
 
 
 def _doubt(one: Adjustable, value: float, width: float) -> Untold | None:

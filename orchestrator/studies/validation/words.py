@@ -238,8 +238,6 @@ def untold_words(one: FittedParameter) -> str:
             return "no: no value that was found leaves clearly less of the error"
         case Untold.INTERRUPTED:
             return "not told: the fit was interrupted before it had an interval"
-        case Untold.ERROR_LEFT:
-            return "not told: the fit leaves more of the error than the scatter makes"
         case Untold.WIDE:
             return "no: its interval is as large as itself"
 
