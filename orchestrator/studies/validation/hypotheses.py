@@ -242,7 +242,10 @@ def sign_that_starts(device: PlayedDevice, event: RecordedEvent, bases: PortBase
 
 
 def _likeliest(comparison: EventComparison, bases: PortBases, error: float) -> list[Question]:
-    """The one reading that explains the most, where it explains enough."""
+    """The one reading that explains the most, where it explains enough.
+
+    What leaves more than the plant moved explains nothing: a model that is out of step has an error that any reading at
+    which it stays in step makes smaller."""
     event, device = comparison.event, comparison.device
     near = cut_event(event, _AFTER, _BEFORE)
     here = math.hypot(*rms_error(comparison.near_power(near), near))
@@ -259,7 +262,7 @@ def _likeliest(comparison: EventComparison, bases: PortBases, error: float) -> l
     least = min(left for left, _ in tried)
     best = next(reading for left, reading in tried if left <= _AS_GOOD * least)
     left = min(_error_left(device, event, best, bases), default=math.inf)
-    if left > best.leaves * error:
+    if left > min(best.leaves * error, math.hypot(*rms_movement(event))):
         return []
     remedy = best.remedy(event.recording)
     figures = {"reading": best.name, "error": error, "left": left, "remedy": remedy}

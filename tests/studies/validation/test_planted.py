@@ -400,6 +400,14 @@ def test_a_q_that_passes_through_zero_has_its_sign(good):
     assert [one["kind"] for one in turned] == ["read otherwise"]
 
 
+def test_a_model_out_of_step_is_in_no_reading_the_right_one(good):
+    """The angle is taken against a bus that swings; exchanged, P and Q would let the model stay in step."""
+    since = np.clip(good.time - 1, 0, None)
+    swing = 8 * np.exp(-0.4 * since) * np.sin(2 * np.pi * 0.7 * since)
+    spoilt = good.assign(angle_deg=good.angle_deg - swing)
+    assert "read otherwise" not in [one["kind"] for one in asked(spoilt)]
+
+
 def test_channels_in_each_others_place_are_read_as_the_remedy_says(good):
     swapped = good.assign(p_mw=good.q_mvar, q_mvar=good.p_mw)
     (question,) = asked(swapped)
