@@ -126,6 +126,7 @@ def find_machines(
         for name in regulated
         if any(v.startswith(_SIGNALS) for v in plans[name].description.variables)
     ]
+    report(0, 1 + request.confirm)
     found, space, model = _linearised(prepared, regulated, request.frequencies)
     modes = _poor(found, 100 * request.below)
     shifts = {label: _shifts(mode, space, model, regulated) for label, mode in modes.items()}

@@ -227,6 +227,7 @@ def find_sites(
     total = len(outages) + request.confirm
     situations, not_judged = [], dict[str, str]()
     for k, outage in enumerate(outages):
+        report(k, total)
         item = Item(0, k, {}, outage.elements, outage.elements)
         try:
             found = preparation.prepared(item).scenario if outage.elements else preparation.base
@@ -240,7 +241,7 @@ def find_sites(
             situations.append(one)
         elif outage.elements:
             not_judged[outage.name] = "no oscillation in the range"
-        report(k + 1, total)
+    report(len(outages), total)
     if not situations or situations[0].name != INTACT:
         low, high = request.frequencies
         raise InputError(

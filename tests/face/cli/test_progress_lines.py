@@ -6,9 +6,12 @@ import time
 
 import pytest
 
+from orchestrator.cases.case import load_case
 from orchestrator.face.cli import explore, main, progress_lines
 from orchestrator.face.cli.progress_lines import ProgressLines
 from orchestrator.studies.points.parts_done import counting, join, parts_done, tally, tell_part
+from orchestrator.studies.siting.machines import find_machines
+from orchestrator.studies.siting.study import SiteRequest, find_sites
 
 POINTS = "time,grid.X_L\n" + "".join(f"{k},{0.1 + 0.01 * k}\n" for k in range(6))
 
@@ -72,6 +75,23 @@ def test_other_studies_say_it_on_standard_error_alone(often, tmp_path, capsys, n
     out, error = capsys.readouterr()
     assert lines_of(error, name)
     assert lines_of(out, name) == []
+
+
+@pytest.mark.parametrize(
+    ("case", "find", "wanted"),
+    [
+        ("two_area_rms", find_sites, SiteRequest("pod_p", scenario="gfor", confirm=1)),
+        ("kundur", find_machines, SiteRequest("regulator", scenario="thyristor", confirm=0)),
+    ],
+)
+def test_a_search_for_places_counts_before_its_first_part_is_done(case, find, wanted):
+    """Its first count came with the first part, so that this was taken for one that was there already."""
+    counts = []
+    find(load_case(case), wanted, lambda *count: counts.append(count))
+    assert counts[0] == (0, 1 + wanted.confirm)
+    assert counts == sorted(counts)
+    done, total = counts[-1]
+    assert done == total
 
 
 @pytest.mark.parametrize("workers", ["1", "2"])
