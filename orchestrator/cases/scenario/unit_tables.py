@@ -29,6 +29,7 @@ from orchestrator.cases.networks.psse.dyr_units import (
     at_their_devices,
     completed,
     missing_records,
+    named_by_bus,
     rows_of_machines,
     with_choices,
     with_infinite_buses,
@@ -298,7 +299,7 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> tuple[list[UnitRow], Sequen
     alphas = _alphas(draft, table, rows)
     replaced = [row.label for row in rows if alphas[row.label] == 1]
     idle = draft.data.idle_machines if draft.data else ()
-    records = at_their_devices(read_dyr(path), machines)
+    records = named_by_bus(at_their_devices(read_dyr(path), machines), table.dyr_leave_out)
     keys = [(machine.bus, machine.name.strip()) for machine in machines]
     ours = {key for key, row in zip(keys, rows, strict=True) if row.label in table.replace}
     refusals = Refusals()

@@ -253,6 +253,20 @@ def _without_active_power(row: UnitRow) -> UnitRow:
     return replace(row, p_min_mw=0.0, p_max_mw=0.0)
 
 
+def named_by_bus(
+    records: Sequence[DynamicRecord], leaving_out: Sequence[str]
+) -> list[DynamicRecord]:
+    """Give records that a name such as ``WSIEG1 at 3106`` leaves out that name as their model's.
+
+    What leaves out a model by its name then leaves out the records of one bus alone."""
+    named = {name.upper() for name in leaving_out}
+    own = [f"{record.name} AT {record.bus}" for record in records]
+    return [
+        replace(record, name=name) if name in named else record
+        for record, name in zip(records, own, strict=True)
+    ]
+
+
 def with_records(
     rows: Sequence[UnitRow],
     machines: Sequence[Machine],

@@ -10,6 +10,7 @@ from fmus.wecc_renewable.dyr_records import PLANT_RECORDS
 from orchestrator.cases.case import load_case, with_protection
 from orchestrator.core.errors import CaseError
 from tests.cases.networks.psse.test_dyr_following import REGCA1, dyr, prepared, record
+from tests.support.mill import mill_case
 
 __all__ = ["prepared"]  # the fixture
 PLANT = (
@@ -335,6 +336,29 @@ def test_a_record_that_cannot_be_read_beside_a_good_shaft_names_nothing_else(pre
     with pytest.raises(CaseError, match="WTARA1 has 3 values, and needs 2") as refused:
         prepared(lines, "")
     assert "to leave out" not in str(refused.value)
+
+
+GOVERNORS = tuple(f"{bus} 'TGOV1' 1 0.05 0.5 1 0 1 3 0" for bus in (1, 2))
+
+
+@pytest.mark.parametrize(
+    ("left", "governed"),
+    [("TGOV1", [False, False]), ("TGOV1 at 2", [True, False]), ("tgov1 at 1", [False, True])],
+)
+def test_records_of_one_bus_are_left_out_alone(tmp_path, left, governed):
+    """The machine at the other bus keeps its governor, and the record is told as not used."""
+    units = f'dyr_leave_out = ["{left}"]\n'
+    (ready,) = load_case(mill_case(tmp_path, GOVERNORS, units=units)).prepare(["base"])
+    plans = [ready.system.components[f"sg{bus}"].description for bus in (1, 2)]
+    assert ["governor.R" in plan.variables for plan in plans] == governed
+    unused = [use for use in ready.records if use.why == "dyr_leave_out names it"]
+    assert len(unused) == governed.count(False)
+
+
+def test_a_bus_without_such_a_record_is_refused(tmp_path):
+    units = 'dyr_leave_out = ["TGOV1 at 7"]\n'
+    with pytest.raises(CaseError, match="names 'TGOV1 at 7', of which the file has no record"):
+        load_case(mill_case(tmp_path, GOVERNORS, units=units)).prepare(["base"])
 
 
 MACHINE_OF_PVD1 = (
