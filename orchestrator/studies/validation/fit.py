@@ -134,8 +134,9 @@ class _Best:
 
     @property
     def exists(self) -> bool:
-        """Return whether there are any; of a fit without a parameter that can be told they are empty."""
-        return self.cost < float("inf")
+        """Return whether there are any: of a first part in longer steps they have no cost, and of a fit without a
+        parameter that can be told they are empty."""
+        return bool(self.values) or self.cost < float("inf")
 
 
 @dataclass
