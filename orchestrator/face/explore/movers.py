@@ -70,7 +70,7 @@ def movers(
     ).result
     least = _NO_EFFECT * abs(found.mode.eigenvalue)
     acting = [row for row in found.rows if row.derivative is not None and row.effect > least]
-    trusted = sorted(acting, key=lambda row: bool(row.doubts))  # the order by effect stays
+    trusted = sorted(acting, key=lambda row: (bool(row.doubts), -row.effect))
     shown = [_as_json(row) for row in trusted[:MOST]]
     return {
         "movers": sorted(shown, key=lambda one: (bool(one["doubts"]), -abs(one["points"]))),
