@@ -40,9 +40,9 @@ _MVAR = "per_100_Mvar_per_Hz"
 
 _SHOWN = 12  # buses in a table, best first
 _NAMED = 4  # things in a sentence; the others are counted
-_COLUMNS = (
-    6  # modes in the terminal's table, the least damped; more columns leave no room for figures
-)
+_COLUMNS = 6
+"""Modes in the terminal's table, the least damped; more columns leave no room for figures."""
+
 _OUTSIDE = f", outside of {Option.RANGE}"
 
 

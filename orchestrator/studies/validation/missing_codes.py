@@ -20,9 +20,9 @@ Samples = NDArray[np.intp]
 
 _NINES = tuple(10.0**digits - 1 for digits in range(3, 9))
 _WORDS = 32767.0, 32768.0, 65535.0, 2147483647.0, 2147483648.0
-_CODES = np.array(
-    _NINES + _WORDS
-)  # magnitudes: nines, and the ends of whole numbers of 2 and 4 bytes
+_CODES = np.array(_NINES + _WORDS)
+"""Magnitudes: nines, and the ends of whole numbers of 2 and 4 bytes."""
+
 _BEYOND_ALL = 1e20  # magnitude in any unit that no plant has
 
 
