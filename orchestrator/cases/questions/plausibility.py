@@ -159,8 +159,13 @@ def check_plausibility(draft: Draft) -> None:
 def question(draft: Draft, doubts: Iterable[UnusualValue]) -> None:
     """Add questions to the draft's, without those that the case answers; equal ones become one."""
     meant = draft.given.case.meant
-    open_ = [d for d in doubts if not any(fnmatch.fnmatchcase(d.name, m) for m in meant)]
+    open_ = [doubt for doubt in doubts if not is_meant(doubt.name, meant)]
     draft.found.questions += _merged(open_, draft.grid)
+
+
+def is_meant(name: str, meant: Iterable[str]) -> bool:
+    """Tell if one of the patterns that a case lists as meant confirms a variable."""
+    return any(fnmatch.fnmatchcase(name, pattern) for pattern in meant)
 
 
 def _is_varied(varied: Iterable[str], doubt: UnusualValue) -> bool:
@@ -344,9 +349,7 @@ def overloads(
             continue
         apparent = abs(P) if plan.kind == "machine" else math.hypot(P, Q)
         apparent *= S_n / (ratings or {}).get(name, S_n)
-        if apparent > _FULL and not any(
-            fnmatch.fnmatchcase(f"{name}.S_n", pattern) for pattern in meant
-        ):
+        if apparent > _FULL and not is_meant(f"{name}.S_n", meant):
             found[name] = apparent
     return found
 

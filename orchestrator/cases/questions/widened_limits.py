@@ -1,8 +1,7 @@
 """The question about limits of exciters and governors that the case widens to its operating point."""
 
-import fnmatch
-
 from orchestrator.cases.draft import Draft
+from orchestrator.cases.questions.plausibility import is_meant
 from orchestrator.core.errors import Problem, QuestionTopic
 from orchestrator.core.question_kinds import answer
 
@@ -15,8 +14,7 @@ def widened_questions(draft: Draft) -> list[Problem]:
     open_ = [
         name
         for name, (_, where) in draft.found.widened.items()
-        if draft.places[name] == where
-        and not any(fnmatch.fnmatchcase(name, pattern) for pattern in meant)
+        if draft.places[name] == where and not is_meant(name, meant)
     ]
     if not open_:
         return []

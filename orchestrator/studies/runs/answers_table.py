@@ -8,7 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 from orchestrator.cases.case import as_typed
-from orchestrator.core.options import Option, command
+from orchestrator.core.options import Option
 from orchestrator.linear.spectra.modes import Mode, damping_percent
 from orchestrator.output.report.colours import OF_VERDICTS
 from orchestrator.output.report.short_texts import LONGEST_REMARK, short
@@ -125,8 +125,6 @@ def _least_swing(results: Sequence[ModesResult]) -> str:
     everywhere = len(found) == len(results) and len({told for _, told, _ in found}) == 1
     where = "" if everywhere else f", in {result.prepared.title}"
     wide = "" if result.hidden is None else result.hidden.wide
-    typed = command("modes CASE", (Option.RANGE, wide)).replace(
-        "CASE", as_typed(result.prepared.case)
-    )
+    typed = f"`gfor modes {as_typed(result.prepared.case)} {Option.RANGE} {wide}`"
     worse = "LESS damped than those above" if answers else "the least damped"
     return f", {worse}: {text}{where} ({typed})"
