@@ -30,7 +30,7 @@ FLOORS = {
             "uncollected",
             "units",
         ),
-        ("assignment", "options"),
+        ("assignment", "bisection", "options"),
         ("errors",),
         ("asked", "attributes", "foreign_files", "question_kinds"),
         ("safe_files", "toml_files", "truth"),

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from orchestrator.cases.form.control_limits import is_limit, is_upper
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.scenario.service import in_service
+from orchestrator.core.bisection import halve_towards
 from orchestrator.devices.fmi.instance import is_ours
 from orchestrator.systems.coupling.coupled import refusal_to_start
 from orchestrator.systems.coupling.system import ComponentPlan
@@ -93,7 +94,8 @@ def _bounded(plan: ComponentPlan, variable: str, distance: float, of: float = 0.
 
 def _nearest(starts: Callable[[float], bool], refused: float, granted: float) -> float:
     """Return the value nearest to a refused one with which a machine starts."""
-    while abs(granted - refused) > _ACCURACY:
-        middle = (refused + granted) / 2
-        refused, granted = (refused, middle) if starts(middle) else (middle, granted)
-    return granted
+    return halve_towards(granted, refused, starts, goes_on=_is_coarse)[0]
+
+
+def _is_coarse(granted: float, refused: float) -> bool:
+    return abs(granted - refused) > _ACCURACY

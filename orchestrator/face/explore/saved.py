@@ -11,6 +11,7 @@ from typing import Any
 
 from orchestrator.cases.form.build_choices import ALPHA
 from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.core.bisection import halve_towards
 from orchestrator.core.errors import CosimError, InputError
 from orchestrator.core.safe_files import check_page, write_text
 from orchestrator.face.api.case import Case
@@ -270,14 +271,14 @@ def _reached_values(
     def farthest(end: float) -> float:
         if end == value or answered(end):
             return end
-        good, bad = value, end
-        for _ in range(_HALVES):
-            middle = float(f"{(good + bad) / 2:.4g}")
-            good, bad = (middle, bad) if answered(middle) else (good, middle)
-        return good
+        return halve_towards(value, end, answered, most=_HALVES, rounded=_in_four_digits)[0]
 
     axis = grid_of(mover, steps)
     return grid_of({**mover, "minimum": farthest(axis[0]), "maximum": farthest(axis[-1])}, steps)
+
+
+def _in_four_digits(x: float) -> float:
+    return float(f"{x:.4g}")
 
 
 def _with_own(axis: Sequence[float], own: float | None) -> list[float]:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.core.bisection import halve_towards
 from orchestrator.core.errors import ErrorKind, few
 from orchestrator.core.options import Option
 from orchestrator.linear.spectra.modes import Mode, damping_percent, make_mode
@@ -77,12 +78,16 @@ def search(
     if first is None:
         return float(len(kinds) - 1), None, []
     again = [k for k in range(first + 1, len(kinds)) if kinds[k] is Ending.HOLDS]
-    low, high = float(first - 1), float(first)
-    for _ in range(HALVINGS if first else 0):
-        middle = (low + high) / 2
-        if between(low, high):
-            low, high = (middle, high) if at(middle) is Ending.HOLDS else (low, middle)
-    return low if first else None, high, again
+    if not first:
+        return None, 0.0, again
+    holds_at, beyond = halve_towards(
+        float(first - 1),
+        float(first),
+        lambda place: at(place) is Ending.HOLDS,
+        goes_on=between,
+        most=HALVINGS,
+    )
+    return holds_at, beyond, again
 
 
 @dataclass(frozen=True, repr=False)
