@@ -6,6 +6,7 @@ right is found anew."""
 
 import hashlib
 import json
+import os
 import platform
 import sys
 from collections.abc import Callable
@@ -21,6 +22,7 @@ from fmus.toolchain.extras import installed_version
 
 _OWN = ("fmus", "gfor_fmu")
 _ENDINGS = {".py", ".c", ".h", ".toml"}
+_COMPILED = "__pycache__"
 _LIBRARIES = ("gfor-cosim", "numpy", "pythonfmu", "scipy", "ziglang")
 
 
@@ -37,9 +39,7 @@ def noted(entry: EntryPoint, asked: str, find: Callable[[], Any]) -> Any:
         return json.loads(path.read_bytes())
     found = find()
     with suppress(CacheError):  # as slow as before, but right
-        if (
-            _code_now() == _code_loaded()
-        ):  # else the code may have been changed between its import and now
+        if _is_as_loaded():
             keep(path, json.dumps(found).encode())
     return found
 
@@ -70,15 +70,27 @@ def machine() -> tuple[str, ...]:
 
 def code_files() -> dict[str, Path]:
     """Files of the models and of the toolchain, C included, by their names from the package on, sorted."""
+    return {name: Path(place) for name, place in sorted(_places().items())}
+
+
+def _places() -> dict[str, str]:
+    """Where the files of `code_files` are; texts, since hundreds of paths take longer than to look at the files."""
     specs = [find_spec(name) for name in _OWN]
     roots = [
-        Path(place)
+        os.path.normpath(place)
         for spec in specs
         if spec is not None
         for place in spec.submodule_search_locations or ()
     ]
-    files = [(root, file) for root in roots for file in root.rglob("*") if file.suffix in _ENDINGS]
-    return dict(sorted((file.relative_to(root.parent).as_posix(), file) for root, file in files))
+    found: dict[str, str] = {}
+    for root in roots:
+        for folder, inside, names in os.walk(root):
+            if _COMPILED in inside:
+                inside.remove(_COMPILED)
+            package = os.path.relpath(folder, os.path.dirname(root)).replace(os.sep, "/")
+            counted = [name for name in names if os.path.splitext(name)[1] in _ENDINGS]
+            found |= {f"{package}/{name}": f"{folder}{os.sep}{name}" for name in counted}
+    return found
 
 
 def _code_now() -> str:
@@ -93,4 +105,16 @@ def _code_loaded() -> str:
     return _code_now()
 
 
+def _touched() -> dict[str, tuple[int, int, int, int]]:
+    """Inode, size and times of the last changes of each file: a fifth of the time of reading them all."""
+    seen = {name: os.stat(place) for name, place in _places().items()}
+    return {name: (x.st_ino, x.st_size, x.st_mtime_ns, x.st_ctime_ns) for name, x in seen.items()}
+
+
+def _is_as_loaded() -> bool:
+    """Tell if the code was not changed between its import and now."""
+    return _touched() == _touched_at_import or _code_now() == _code_loaded()
+
+
+_touched_at_import = _touched()  # before the code is read, so that a later change differs
 _code_loaded()

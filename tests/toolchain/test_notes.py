@@ -1,5 +1,6 @@
 """What is noted of a model is used again only where all that it follows from is the same."""
 
+import os
 from importlib.metadata import EntryPoint
 
 import pytest
@@ -56,7 +57,7 @@ def test_every_file_of_the_models_counts(tmp_path, monkeypatch):
     } <= names
     assert {"gfor_fmu/droop.py", "fmus/toolchain/c/clock.h"} <= names
     file = tmp_path / "model.py"
-    monkeypatch.setattr(notes, "code_files", lambda: {"fmus/model.py": file})
+    monkeypatch.setattr(notes, "_places", lambda: {"fmus/model.py": str(file)})
     hashes = []
     for text in ("T = 1.0", "T = 2.0", "T = 1.0"):
         file.write_text(text, encoding="utf-8")
@@ -64,10 +65,36 @@ def test_every_file_of_the_models_counts(tmp_path, monkeypatch):
     assert hashes[0] == hashes[2] != hashes[1]
 
 
-def test_nothing_is_noted_of_code_that_was_changed_since_it_was_loaded(monkeypatch):
-    monkeypatch.setattr(notes, "_code_now", lambda: "changed")
+@pytest.fixture
+def loaded(tmp_path, monkeypatch):
+    """The one file of a model's code, as this process has loaded it."""
+    file = tmp_path / "model.py"
+    file.write_text("T = 1.0", encoding="utf-8")
+    monkeypatch.setattr(notes, "_places", lambda: {"fmus/model.py": str(file)})
+    monkeypatch.setattr(notes, "_touched_at_import", notes._touched())
+    found = notes._code_now()
+    monkeypatch.setattr(notes, "_code_loaded", lambda: found)
+    return file
+
+
+def test_nothing_is_noted_of_code_that_was_changed_since_it_was_loaded(loaded):
+    loaded.write_text("T = 2.05", encoding="utf-8")
     assert noted(OURS, "a", lambda: 1) == 1
     assert noted(OURS, "a", lambda: 2) == 2
+
+
+def test_code_that_is_written_again_as_it_was_is_no_change(loaded):
+    loaded.unlink()
+    loaded.write_text("T = 1.0", encoding="utf-8")
+    os.utime(loaded, (0, 0))
+    assert noted(OURS, "a", lambda: 1) == 1
+    assert noted(OURS, "a", never) == 1
+
+
+def test_code_is_not_read_again_where_no_file_was_touched(loaded, monkeypatch):
+    monkeypatch.setattr(notes, "_code_now", never)
+    assert noted(OURS, "a", lambda: 1) == 1
+    assert noted(OURS, "a", never) == 1
 
 
 def test_nothing_is_noted_of_a_model_of_another_distribution():
