@@ -37,8 +37,9 @@ _SAME = {
 }
 
 PYTHON = _SAME | {
-    Op.DIV: "divide({0}, {1})",
-    Op.INV: "divide(1.0, {0})",
+    # calls take longer than divisions
+    Op.DIV: "{0} / {1} if {1} else divide({0}, {1})",
+    Op.INV: "1.0 / {0} if {0} else divide(1.0, {0})",
     Op.SQ: "{0} * {0}",
     Op.POW: "power({0}, {1})",
     Op.CONSTPOW: "power({0}, {1})",
