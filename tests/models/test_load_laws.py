@@ -31,7 +31,10 @@ def standing(model, u, values=None):
     """The steady state for inputs, by Newton's method."""
     at = Evaluated(model, values)
     for _ in range(60):
-        at.x = at.x - np.linalg.solve(at.blocks(u)[0], list(at.rates(u).values()))
+        moved = np.linalg.solve(at.blocks(u)[0], list(at.rates(u).values()))
+        at.x = at.x - moved
+        if np.abs(moved).max() < 1e-14:  # the last bits of states of about 1
+            break
     assert max(abs(r) for r in at.rates(u).values()) < 1e-6
     return at
 

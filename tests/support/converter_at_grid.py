@@ -1,6 +1,7 @@
 """The grid-forming converter at a source behind an impedance, in one model: no communication step lies between."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from fmus.toolchain.port import declare_rating, port_at
 from fmus.toolchain.symbols import Expr
 from gfor_fmu.converter import P_0, S_N, declare_converter, declare_converter_outputs
 from orchestrator.devices.fmi.component import RealBatch
-from orchestrator.devices.fmi.description import read_description
+from orchestrator.devices.fmi.description import FmuDescription, read_description
 from orchestrator.devices.fmi.loaded_component import LoadedComponent
 
 X_R = 6.0
@@ -99,11 +100,17 @@ Stage = tuple[float, dict[str, float]]
 """What is set, and for how long it stays [s]."""
 
 
+@cache
+def _described() -> FmuDescription:
+    """The model's FMU; to find it, its equations are written, which takes ten times a run of it."""
+    return read_description(cached(NativeFmu(converter_at_grid())))
+
+
 class AtGrid:
     """Runs of that model at one short-circuit ratio; use it as a context manager."""
 
     def __init__(self, scr: float) -> None:
-        self._description = read_description(cached(NativeFmu(converter_at_grid())))
+        self._description = _described()
         X = X_R / np.hypot(1, X_R) / scr
         self._grid = {"R": X / X_R, "X": X}
 

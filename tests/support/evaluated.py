@@ -55,7 +55,11 @@ class Evaluated:
 
     def blocks(self, u):
         """Exact A, B, C, D at the states."""
-        return [np.array(block) for block in jacobians(self.model)(self.x, u, self.p, self.c)]
+        return [np.array(block) for block in self._jacobians(self.x, u, self.p, self.c)]
+
+    @cached_property
+    def _jacobians(self):
+        return jacobians(self.model)
 
     def response(self, s, u):
         """Transfer function at s [1/s] from every input to every output, as (output, input) → value."""
