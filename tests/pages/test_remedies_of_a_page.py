@@ -4,11 +4,13 @@ import re
 from pathlib import Path
 
 from orchestrator.cases.form import remedies
+from orchestrator.cases.networks.psse.dyr_mistakes import WITHOUT_RECORD
 
 PAGE = Path(__file__).parents[2] / ".docs" / "how-to" / "own-network.md"
 PRINTED = (
     remedies.without_kinds(["facts device"]),
     remedies.without_models(["MODEL"]),
+    remedies.without_models([WITHOUT_RECORD]),
     remedies.APPROXIMATING,
     remedies.replacement_of("3"),
     remedies.with_frequency(60.0),

@@ -13,14 +13,19 @@ def without_kinds(kinds: Sequence[str]) -> str:
 
 def without_models(names: Sequence[str]) -> str:
     """Return the same for records of dynamics data, by the names of their models."""
-    options = [(Option.DYR_LEAVE_OUT, name) for name in names]
+    options = [(Option.DYR_LEAVE_OUT, f'"{n}"' if " " in n else n) for n in names]
     return f"dyr_leave_out = {_toml_list(names)} in [units] (" + command("new", *options) + ")"
 
 
 def replacement_of(unit: str) -> str:
     """Return what puts a converter of the case in the place of a machine, by the label of its unit."""
-    typed = command("new", (Option.REPLACE, unit))
-    return f"replace = {_toml_list([unit])} in [units] (" + typed + ")"
+    return replacements_of([unit])
+
+
+def replacements_of(units: Sequence[str]) -> str:
+    """Return the same for several machines."""
+    typed = command("new", *((Option.REPLACE, unit) for unit in units))
+    return f"replace = {_toml_list(units)} in [units] (" + typed + ")"
 
 
 def with_frequency(hertz: float) -> str:

@@ -169,7 +169,16 @@ GALLERY = {
         "it cannot be left out", NINE, DYR.replace("3 'GENCLS'", "3 'GENQEC1'")
     ),
     "machine without a record": Broken(
-        "and a converter of ours stands there", NINE, changed(DYR, (GENCLS + "\n", ""))
+        "and a converter of ours stands there",
+        NINE,
+        changed(DYR, (GENCLS + "\n", "")),
+        undo=(('replace = ["3"]', ""),),
+    ),
+    "machines without a record": Broken(
+        "is a constant current (static generation)",
+        NINE,
+        re.sub(rf"(?m)^2,'GENROU'.*\n|^{GENCLS}\n", "", DYR),
+        undo=(('replace = ["2", "3"]', ""),),
     ),
     "converter that is not known": Broken(
         "a grid-following converter", NINE, changed(DYR, (GENCLS, "3 'WT4G1' 1 0 /"))

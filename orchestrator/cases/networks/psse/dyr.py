@@ -8,6 +8,7 @@ from fmus.static_var.held_bus import ELSEWHERE
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.dyr_mistakes import (
     LEAST_STRANGE,
+    WITHOUT_RECORD,
     count_repeats,
     going_with_shafts,
     other_network,
@@ -24,6 +25,7 @@ from orchestrator.cases.networks.psse.machine_model import (
     CLASSICAL,
     OF_PLANTS,
     SOURCE_IMPEDANCE,
+    STATIC,
     MachineModel,
     plant_of,
 )
@@ -59,7 +61,7 @@ def machine_models(
     ``approximate``: whether WECC's grid-following converters become `gfl_phasor`, which leaves a part of them out; else
     those of REGCA1 are models of their own."""
     left = {name.upper() for name in leaving_out}
-    _refuse_absent(leaving_out, records)
+    _refuse_absent([name for name in leaving_out if name != WITHOUT_RECORD], records)
     # a load may have the identifier of the machine at its bus
     records = [record for record in records if not names_load(record.name)]
     found = PartsOfMachines(machines, left, approximate=approximate)
@@ -67,24 +69,43 @@ def machine_models(
         found.take(record)
     place_limiters([] if found.problems else records, left, found.parts, found.values)
     found.give_infinite_machines()
+    static = _static_machines(found, replaced) if WITHOUT_RECORD in leaving_out else {}
     measured = measured_points(found.records, found.parts, found.problems)
     following: dict[MachineKey, MachineModel] = {}
     if approximate:
         following = models_of_following(found.records, left, found.problems, found.labels)
     for key in following:
         found.parts[key]["converter"] = MODEL
+    for key in static:
+        found.parts[key]["converter"] = STATIC
     _refuse_what_lacks(found, records, left, {*replaced}, {*idle})
-    return following | {
-        key: replace(
-            _own_model(found, key, elsewhere=key in measured, is_open=found.is_open(key)),
-            lines=found.lines[key],
-            replaced=tuple(_left_out_of_plant(found.parts[key], found.records[key], left)),
-            measured=measured.get(key),
-            doubts=tuple(doubts_of_machine(machine, found.records[key], found.values[key])),
+    return (
+        following
+        | static
+        | {
+            key: replace(
+                _own_model(found, key, elsewhere=key in measured, is_open=found.is_open(key)),
+                lines=found.lines[key],
+                replaced=tuple(_left_out_of_plant(found.parts[key], found.records[key], left)),
+                measured=measured.get(key),
+                doubts=tuple(doubts_of_machine(machine, found.records[key], found.values[key])),
+            )
+            for key, machine in found.machines.items()
+            if {"machine", "converter"} & {*found.parts[key]} and key not in following | static
+        }
+    )
+
+
+def _static_machines(
+    found: PartsOfMachines, replaced: Collection[MachineKey]
+) -> dict[MachineKey, MachineModel]:
+    """Return static generation in the place of the machines that have no record; `InputError` where each has one."""
+    bare = [key for key in without_machine(found.parts) if not found.records[key]]
+    if not bare:
+        raise InputError(
+            f"dyr_leave_out names {WITHOUT_RECORD!r}, and every machine has a record; take it out"
         )
-        for key, machine in found.machines.items()
-        if {"machine", "converter"} & {*found.parts[key]} and key not in following
-    }
+    return {key: MachineModel({}, {}, STATIC) for key in bare if key not in replaced}
 
 
 def _refuse_what_lacks(
@@ -116,7 +137,8 @@ def _refuse_what_lacks(
         problems = [other_network(strange, records, bare, len(found.machines)), *problems]
         strange = []
         accounted |= {*bare}
-    unfit = records_unfit(found.parts, accounted, found.labels)
+    recorded = {key for key, own in found.records.items() if own}
+    unfit = records_unfit(found.parts, accounted, found.labels, recorded)
     with_shafts = going_with_shafts(found.unread, found.records)
     problems = [*(slips(strange) if bare else ()), *problems, *with_shafts, *unfit]
     if not problems and not missing:

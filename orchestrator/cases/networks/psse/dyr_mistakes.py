@@ -5,7 +5,12 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
 from fmus.grid_following.dyr_approximation import FIELDS, MODEL
 from fmus.wecc_renewable.dyr_records import PLANT_RECORDS
-from orchestrator.cases.form.remedies import APPROXIMATING, replacement_of, without_models
+from orchestrator.cases.form.remedies import (
+    APPROXIMATING,
+    replacement_of,
+    replacements_of,
+    without_models,
+)
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.dyr_unit_records import RECORDS_OF_UNITS
 from orchestrator.cases.networks.psse.machine_model import (
@@ -24,6 +29,9 @@ LEAST_STRANGE = (
 )
 _NAMED = 8  # buses that one problem names
 
+WITHOUT_RECORD = "machine without record"
+"""What ``dyr_leave_out`` names so that machines without any record feed their power as a constant current."""
+
 
 def count_repeats(problems: Sequence[str], first: Mapping[str, str]) -> Iterator[str]:
     """The problems, each once: of those with a place of a first record, how many more there are."""
@@ -36,20 +44,51 @@ def records_unfit(
     parts: Mapping[tuple[int, str], Mapping[str, str]],
     replaced: Collection[tuple[int, str]],
     labels: Mapping[tuple[int, str], str],
+    recorded: Collection[tuple[int, str]],
 ) -> Iterator[str]:
-    """Machines whose records are too many or too few; ``labels`` are of their units."""
+    """Machines whose records are too many or too few.
+
+    ``labels``: of their units; ``recorded``: machines that have records at all."""
     for (bus, name), own in parts.items():
         if (bus, name) not in replaced:
             yield from _incomplete(f"machine {name!r} at bus {bus}", own, labels[bus, name])
         others = ", ".join(kind for kind in own if kind not in KINDS_OF_CONVERTERS)
         if "converter" in own and others:
             yield f"machine {name!r} at bus {bus} is a converter, and has records of its {others}; remove them"
-    for bus, name in without_machine(parts):
-        if (bus, name) not in replaced:
-            yield (
-                f"machine {name!r} at bus {bus} has no record of a machine; add one, or write "
-                f"{replacement_of(labels[bus, name])}, and a converter of ours stands there"
-            )
+    bare = [key for key in without_machine(parts) if key not in replaced]
+    partly = [key for key in bare if key in recorded]
+    alone = [key for key in bare if key not in recorded]
+    if alone:
+        yield _without_records(alone, labels, may_be_static=True)
+    if partly:
+        yield _without_records(partly, labels, may_be_static=False)
+
+
+def _without_records(
+    bare: Sequence[tuple[int, str]],
+    labels: Mapping[tuple[int, str], str],
+    *,
+    may_be_static: bool,
+) -> str:
+    """Return the problem of all machines without a record: one cause, with remedies as they are typed.
+
+    ``may_be_static``: whether they have no records of controls either."""
+    (bus, name), *others = bare
+    begin, end = f"machine {name!r} at bus {bus} has no record of a machine; add one", ""
+    if others:
+        named = few((f"{name!r} at bus {bus}" for bus, name in bare), _NAMED)
+        begin = f"{len(bare)} machines have no record of a machine ({named}); add them"
+    replaced = [labels[key] for key in bare]
+    if may_be_static:
+        begin += (
+            f", or write {without_models([WITHOUT_RECORD])}, and its power in the RAW file is a constant current "
+            "(static generation)"
+        )
+        if len(bare) > _NAMED:
+            replaced, end = replaced[:1], ", for the first of them"
+    return (
+        f"{begin}, or write {replacements_of(replaced)}, and a converter of ours stands there{end}"
+    )
 
 
 def _incomplete(machine: str, own: Mapping[str, str], unit: str) -> Iterator[str]:

@@ -16,6 +16,7 @@ from orchestrator.cases.networks.psse.machine_model import (
     CLASSICAL,
     COMPENSATION,
     MANUAL,
+    STATIC,
     WITHOUT_INERTIA,
 )
 from orchestrator.cases.networks.psse.plant_points import HELD_BUS
@@ -304,8 +305,16 @@ def with_records(
                     converter=model.converter,
                     replaced=model.replaced,
                     measured=model.measured,
-                    doubts=model.doubts,
+                    doubts=(_doubt_of_static(row),) if model.converter == STATIC else model.doubts,
                     lines=model.lines,
                 )
             )
     return found
+
+
+def _doubt_of_static(row: UnitRow) -> DoubtOfRecord:
+    text = (
+        "no record of the machine, whose power is taken as a constant current (static generation): it holds no voltage "
+        "and adds no inertia; add its records, or name it in [units] replace for a converter of ours"
+    )
+    return DoubtOfRecord("machine", row.place, text, "a machine without a record")

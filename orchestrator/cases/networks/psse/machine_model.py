@@ -26,6 +26,9 @@ SOURCE_IMPEDANCE = {
 }
 """Parameters that ZSORCE of the network data gives, by the converter's model or record."""
 
+STATIC = "static_generation_phasor"
+"""Model of a machine without a record that the case takes as a constant current."""
+
 BY_SPEED = "electrical.PFLAG"
 """Parameter of a control that only a plant with a shaft has."""
 

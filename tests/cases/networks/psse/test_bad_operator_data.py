@@ -57,7 +57,7 @@ RAWS = {
     ),
 }
 DYRS = {
-    "an empty file": ("", CASE, r"machine '1' at bus 3 has no record of a machine"),
+    "an empty file": ("", CASE, r"3 machines have no record of a machine \('1' at bus 1,"),
     "another identifier": (
         DYR.replace("2,'GENROU','1'", "2,'GENROU','7'"),
         CASE,

@@ -7,6 +7,7 @@ import pytest
 from fmus.regfm_a1.dyr_records import REGFM_A1_RECORDS
 from fmus.toolchain.catalogue import build_model
 from orchestrator.cases.case import load_case
+from orchestrator.cases.networks.psse.dyr_mistakes import records_unfit
 from orchestrator.core.errors import CaseError
 from tests.cases.networks.psse import raw, records
 from tests.cases.networks.psse.test_dyr import CASE, DYR
@@ -135,6 +136,49 @@ def test_a_grid_following_unit_is_a_converter_of_the_case(tables):
     assert "sg3" not in found
     with pytest.raises(CaseError, match="machine '1' at bus 3 has no record of a machine"):
         tables(dyr, case)
+
+
+BARE = DYR.replace("3 'GENCLS' 1  2.35 0.0 /", "")
+STATIC = '[units]\ndyr_leave_out = ["machine without record"]'
+
+
+def test_a_machine_without_a_record_may_be_a_constant_current(tables, tmp_path):
+    with pytest.raises(CaseError, match="machine '1' at bus 3 has no record") as refused:
+        tables(BARE, PHASORS)
+    assert "dyr_leave_out = ['machine without record'] in [units]" in str(refused.value)
+    assert '`gfor new --dyr-leave-out "machine without record"`' in str(refused.value)
+    found = tables(BARE, PHASORS.replace("[units]", STATIC))
+    unit = found["gfor3"]
+    assert "sg3" not in found
+    assert (unit.model, unit.bus) == ("static_generation_phasor", "bus_3")
+    assert unit.parameters == {"S_n": 128.0, "P_0": 85.0 / 128.0, "v_0": 1.025}
+    (asked,) = (
+        str(q)
+        for q in load_case(tmp_path / "case.toml").prepare(["plain"])[0].questions
+        if "no record of the machine" in str(q)
+    )
+    assert "gfor3: no record of the machine, whose power is taken as a constant current" in asked
+    assert 'meant = ["gfor3.machine"]' in asked
+
+
+def test_only_a_machine_without_any_record_may_be_one(tables):
+    exciter = "3 'SEXS' 1 0.1 10.0 100.0 0.05 -5.0 5.0 /\n"
+    with pytest.raises(CaseError, match="machine '1' at bus 3 has no record") as refused:
+        tables(BARE + exciter, PHASORS)
+    assert "machine without record" not in str(refused.value)
+    with pytest.raises(CaseError, match="'machine without record', and every machine has"):
+        tables(DYR, PHASORS.replace("[units]", STATIC))
+
+
+def test_many_machines_without_a_record_are_one_problem_with_one_remedy():
+    bare = {(bus, "1"): {} for bus in range(1, 12)}
+    labels = {(bus, "1"): str(bus) for bus, _ in bare}
+    (said,) = records_unfit(bare, (), labels, ())
+    assert said.startswith("11 machines have no record of a machine ('1' at bus 1, '1' at bus 2, ")
+    assert "'1' at bus 8 and 3 more); add them, or write dyr_leave_out" in said
+    assert said.endswith(
+        "(`gfor new --replace 1`), and a converter of ours stands there, for the first of them"
+    )
 
 
 @pytest.mark.slow

@@ -40,12 +40,13 @@ def test_files_of_two_networks_are_one_problem(tmp_path, machines, records, plac
 
 
 def test_files_of_one_network_with_records_at_other_buses_are_told_by_machine(tmp_path):
-    """Most records have a machine, so the files belong together: each machine without a record can be mended."""
+    """Most records have a machine, so the files belong together: the machines without a record are one problem."""
     said = renumbered(tmp_path, {4, 5})
     assert "do not belong together" not in said
     assert "the RAW file does not have GENROU of machine '1' at bus 104, " in said
-    for bus in (4, 5):
-        assert f"machine '1' at bus {bus} has no record of a machine; add one, or write" in said
+    bare = "2 machines have no record of a machine ('1' at bus 4, '1' at bus 5); add them, or write"
+    assert bare in said
+    assert "(`gfor new --replace 4 --replace 5`), and a converter of ours stands there" in said
 
 
 def test_a_slip_at_one_machine_names_its_records(tmp_path):
