@@ -438,6 +438,17 @@ def test_ggov1_starts_above_the_load_of_its_limiter_and_gives_no_more():
     assert found[-1]["P_m"] == pytest.approx(P_M + 1.5e-3, abs=1e-3)
 
 
+def test_ggov1_starts_at_a_fuel_beyond_1_and_gives_no_more():
+    """With a valve that opens beyond 1, as where its limit is widened to the operating point."""
+    values = {"R_select": 0, "K_pgov": 4.0, "K_turb": 0.75, "V_MAX": 1.5}  # fuel P_M/0.75 + 0.2
+    alone = governor("ggov1", values | {"ld_ref": 2.0})
+    assert not refused(alone)
+    assert P_M / 0.75 + 0.2 > 1
+    assert max(map(abs, alone.rates([1.0, P_M]).values())) < 1e-12
+    found, _ = integrated(alone, lambda t: [0.95, P_M], 40.0, step=2e-3)
+    assert found[-1]["P_m"] == pytest.approx(P_M + 0.75e-3, abs=1e-6)
+
+
 def test_the_valve_of_ggov1_moves_no_faster_than_its_rates():
     alone = governor("ggov1", {"T_act": 0.01, "R_open": 0.1, "R_close": -0.2, "T_b": 0.0})
     for w, fastest in ((0.95, 0.1), (1.05, -0.2)):

@@ -13,8 +13,9 @@ A PID controller of the speed and a limiter of the load, by the exhaust's temper
     load controller = K_imw/s of (P_e0 − P_e), within ± 1.1·R
 
 Feedback (R_select) is the electrical power through 1/(1+sT_pelec) (1), the valve (−1) or none (0). An integrator stops
-while its controller asks for more than it gets. Where the operating point lies at ld_ref or above, the limiter holds a
-load just above it instead, so that the turbine starts in steady state and gives no more. Powers are on T_rate, or on
+while its controller asks for more than it gets. Where the operating point lies at ld_ref or above, or asks for a fuel
+of 1 or more, the limiter holds a load or a fuel just above it instead, so that the turbine starts in steady state and
+gives no more. Powers are on T_rate, or on
 S_n where that is 0; the delay is Padé's of second order. A moved reference arrives at R_up and R_down per second at
 most. The limiter of the acceleration (a_set, K_a, T_a) is left out: it acts while the speed gains more than a_set per
 second.
@@ -154,11 +155,12 @@ def _request(m: ModelBuilder, p: Given, error: Expr, fuel: Expr, w: Expr, valve_
     exhaust = low_pass_or_nothing(m, "exhaust", heat, p.T_fload, valve_0)
     held_fuel = p.ld_ref / p.K_turb + p.w_fnl
     rest = if_else(held_fuel > valve_0, held_fuel, valve_0 + _HEADROOM) - exhaust
-    y = m.state("load_limiter", _MOST_FUEL, "pu", "Integral of the load's limiter", base="S_n")
+    most = if_else(valve_0 < _MOST_FUEL, _MOST_FUEL, valve_0 + _HEADROOM)
+    y = m.state("load_limiter", most, "pu", "Integral of the load's limiter", base="S_n")
     asked = p.K_pload * rest + y
-    held = logic_and(asked >= _MOST_FUEL, rest > 0)
-    m.derivative(y, if_else(held, (_MOST_FUEL - y) / BYPASS_TIME, p.K_iload * rest))
-    fsr = clamp(fmin(governed, fmin(asked, _MOST_FUEL)), p.V_MIN, p.V_MAX)
+    held = logic_and(asked >= most, rest > 0)
+    m.derivative(y, if_else(held, (most - y) / BYPASS_TIME, p.K_iload * rest))
+    fsr = clamp(fmin(governed, fmin(asked, most)), p.V_MIN, p.V_MAX)
     outward = logic_or(logic_and(governed > fsr, error > 0), logic_and(governed < fsr, error < 0))
     moves = if_else(outward, 0, p.K_igov * error)
     m.derivative(x, if_else(p.K_igov > 0, moves, (valve_0 - x) / BYPASS_TIME))
