@@ -95,7 +95,7 @@ def test_what_the_list_names_exists():
     for test, _ in read_list(LIST):
         file, _, name = test.partition("::")
         text = (ROOT / file).read_text(encoding="utf-8")
-        assert name == "*" or f"def {name}(" in text, test
+        assert name == "*" or f"def {name.removesuffix('*')}(" in text, test
 
 
 def test_a_line_that_is_none_is_said(tmp_path):
