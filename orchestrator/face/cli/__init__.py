@@ -10,7 +10,7 @@ from importlib import import_module
 from io import TextIOWrapper
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from fmus.toolchain.extras import SetupError
 from orchestrator.core.errors import INTERRUPTED, TERMINATED, CosimError, InputError
@@ -331,14 +331,22 @@ def _parser(
     )
     parser.set_defaults(command=lambda _: _print(QUESTIONS))
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
-    lists = {"": parser.add_subparsers(metavar="COMMAND", parser_class=_Command)}
+    unchosen = _Command(add_help=False)
+
+    def make(*, add_help: bool = True, **given: Any) -> argparse.ArgumentParser:
+        """The parser of a command; those of the others are listed, never asked, and one and the same."""
+        return _Command(**given) if add_help else unchosen
+
+    # argparse only calls what it is given as a class
+    kind_of_parser = cast("type[argparse.ArgumentParser]", make)
+    lists = {"": parser.add_subparsers(metavar="COMMAND", parser_class=kind_of_parser)}
     for name, words in listed.items():
         group, _, last = name.rpartition(" ")
         if group not in lists:
             whole = lists[""].add_parser(group, help=GROUPS[group], description=GROUPS[group])
             whole.set_defaults(command=lambda _, whole=whole: _print(whole.format_help()))
-            lists[group] = whole.add_subparsers(metavar="COMMAND", parser_class=_Command)
-        # each option costs argparse a look for translations, and nobody asks the others for help
+            lists[group] = whole.add_subparsers(metavar="COMMAND", parser_class=kind_of_parser)
+        # each parser costs argparse looks for translations, and nobody asks the others for help
         command = lists[group].add_parser(last, help=words, add_help=name in chosen)
         if name in chosen:
             for kind in (None, "store"):
