@@ -1,14 +1,18 @@
 """A question's process reads and writes where it may, and ends in time."""
 
+import io
 import json
 import subprocess
 import sys
+from contextlib import chdir, redirect_stderr, redirect_stdout, suppress
 
 import pytest
 
 import orchestrator as gfor
+from orchestrator.face.agents import question
 from orchestrator.face.agents.question import Allowance, NoAnswerError, ask
 from orchestrator.face.agents.verbs import Verbs, _deciding, _growth_elsewhere
+from orchestrator.face.cli import main
 
 WITHIN = """
 import json, os, sys
@@ -79,6 +83,20 @@ def allowance(folder, seconds=60.0):
     return Allowance((folder,), folder / "results", seconds)
 
 
+@pytest.fixture
+def here(monkeypatch):
+    """Let commands run in this process, for tests of what is made of what they say."""
+
+    def run(task, allowance, temporary):
+        out, err = io.StringIO(), io.StringIO()
+        told = redirect_stdout(out), redirect_stderr(err)
+        with chdir(task["results"]), told[0], told[1], suppress(SystemExit):  # argparse's way out
+            main(task["words"])
+        return out.getvalue().encode(), err.getvalue().encode()
+
+    monkeypatch.setattr(question, "_run", run)
+
+
 def test_a_case_cannot_read_what_lies_outside(tmp_path):
     root = tmp_path / "root"
     root.mkdir()
@@ -130,7 +148,7 @@ def test_a_long_question_is_refused(tmp_path):
         Verbs(allowance(tmp_path)).modes("two_area", "base", values)
 
 
-def test_a_refusal_comes_without_the_usage(tmp_path):
+def test_a_refusal_comes_without_the_usage(tmp_path, here):
     with pytest.raises(NoAnswerError, match=r"^argument --stop: '-1\.0' must exceed 0"):
         Verbs(allowance(tmp_path)).run_summary("two_area", "base", -1.0)
 
@@ -149,12 +167,12 @@ def test_a_question_ends_in_time(tmp_path):
         ask(["modes", "two_area", "--json"], allowance(tmp_path, 0.05))
 
 
-def test_an_error_is_the_commands_own(tmp_path):
+def test_an_error_is_the_commands_own(tmp_path, here):
     with pytest.raises(NoAnswerError, match="scenario"):
         Verbs(allowance(tmp_path)).modes("two_area", "no_such")
 
 
-def test_an_explanation_names_who_swings(tmp_path):
+def test_an_explanation_names_who_swings(tmp_path, here):
     told = Verbs(allowance(tmp_path)).explain("two_area", "base")
     assert told.stable is False
     assert told.verdict.startswith("UNSTABLE")
@@ -164,14 +182,14 @@ def test_an_explanation_names_who_swings(tmp_path):
     assert told.doubts == []
 
 
-def test_a_doubt_is_told_once(tmp_path):
+def test_a_doubt_is_told_once(tmp_path, here):
     told = Verbs(allowance(tmp_path)).explain("two_area_rms", "base", {"gfor.pod_p.K": 100})
     assert [text for text in told.doubts if "cannot act" in text] == [
         "--set gfor.pod_p.K: gfor.pod_p.K cannot act: the scenario has no gfor"
     ]
 
 
-def test_a_stable_scenario_is_explained_by_its_least_damped_mode(tmp_path):
+def test_a_stable_scenario_is_explained_by_its_least_damped_mode(tmp_path, here):
     told = Verbs(allowance(tmp_path)).explain("two_area", "pod_p")
     (least, *_) = sorted(
         gfor.load("two_area").scenario("pod_p").modes(), key=lambda mode: mode.damping_percent
@@ -180,7 +198,7 @@ def test_a_stable_scenario_is_explained_by_its_least_damped_mode(tmp_path):
     assert f"the mode of {least.frequency_hz:.3f} Hz" in why
 
 
-def test_growth_outside_of_the_listed_frequencies_is_explained(tmp_path):
+def test_growth_outside_of_the_listed_frequencies_is_explained(tmp_path, here):
     """Something of WSCC's base case grows without an oscillation, and both swings decay."""
     told = Verbs(allowance(tmp_path)).explain("wscc9", "base")
     assert told.stable is False
