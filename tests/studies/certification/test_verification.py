@@ -81,7 +81,7 @@ def another_fmu(folder):
 
 def a_sample(folder):
     data = xr.load_dataset(folder / "responses.nc", engine="scipy")
-    data[POWER].loc[{"scenario": "with", "X_L": 0.3}][700] += 1e-9
+    data[POWER].loc[{"scenario": "with", "X_L": 0.3}][175] += 1e-9
     data.to_netcdf(folder / "responses.nc", engine="scipy")
 
 
