@@ -39,10 +39,12 @@ def test_a_gain_is_found_within_its_interval(gfor, recording):
     assert found["high"] - found["low"] < 30
 
 
-def test_intervals_beside_an_error_that_stays_do_not_hold(recording):
-    """Its droop is wrong, which the fit of a gain cannot mend."""
-    values = ON | {"droop.R_f": 0.09}
-    found = gfor_in_python.validate("gfor", recording, values=values, fit="pod_p.K")
+def test_intervals_beside_an_error_that_stays_do_not_hold(recording, monkeypatch):
+    """Its droop is wrong, which the fit of a gain cannot mend; other starts find no more."""
+    monkeypatch.setattr(fit, "_starts", lambda residuals, told, switches: iter([told]))
+    frame = pd.read_csv(recording, index_col="time").loc[:3.0]
+    given = {"values": ON | {"droop.R_f": 0.09}, "fit": "pod_p.K", "step": "500 us"}
+    found = gfor_in_python.validate("gfor", frame, **given)
     assert not found.result.fit.reached
     assert not found.as_json()["fit"][0]["holds"]
     assert "95 %, does not hold" in found.html()
