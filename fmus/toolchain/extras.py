@@ -1,7 +1,6 @@
 """Libraries that only some users need: the extra that installs each, and one error where one is missing."""
 
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 
 EXTRAS = {
@@ -43,7 +42,9 @@ def require(purpose: str, *libraries: str) -> None:
 @cache
 def installed_version(library: str) -> str:
     """Version of an installed distribution; empty text where it is not installed."""
+    from importlib import metadata  # noqa: PLC0415 - imports what reads e-mail, also in a device's process
+
     try:
-        return version(library)
-    except PackageNotFoundError:
+        return metadata.version(library)
+    except metadata.PackageNotFoundError:
         return ""
