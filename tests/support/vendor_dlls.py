@@ -1,12 +1,12 @@
 """Controllers as IEEE/CIGRE DLLs, written for the tests: sound ones and ones with a planted fault."""
 
 import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from fmus.toolchain.compiler import ENDINGS, FLAGS, TARGETS
+from fmus.toolchain.cache import cache_directory, intact, keep, key_of
+from fmus.toolchain.compiler import ENDINGS, FLAGS, TARGETS, _zig, recipe
 
 OWN_LIBRARY = {"win64": [flag for flag in FLAGS if flag != "-fvisibility=hidden"]}
 """By other flags than the project's own the compiler would build its C library once more, in a minute."""
@@ -68,24 +68,18 @@ def lag(
 
 
 def compiled(source, folder, name="controller", platform="linux64"):
-    """The library of a source, in a folder."""
+    """The library of a source that includes the system's headers alone, in a folder; kept in the cache of libraries."""
     text, library = folder / f"{name}.c", folder / f"{name}{ENDINGS[platform]}"
     text.write_text(source, encoding="utf-8")
     target = () if platform == "linux64" else ("-target", TARGETS[platform][0])
     flags = ("-O1", "-shared", "-fPIC", "-g0", "-ffp-contract=off", *OWN_LIBRARY.get(platform, ()))
-    command = [
-        sys.executable,
-        "-m",
-        "ziglang",
-        "cc",
-        *target,
-        *flags,
-        str(text),
-        "-o",
-        str(library),
-        "-lm",
-    ]
-    subprocess.run(command, check=True, capture_output=True, cwd=folder)
+    key = key_of(source, name, *target, *flags, *recipe())
+    kept = cache_directory("libraries") / f"{key}{ENDINGS[platform]}"
+    if not intact(kept):
+        command = [_zig(), "cc", *target, *flags, text, "-o", library, "-lm"]
+        subprocess.run(command, check=True, capture_output=True, cwd=folder)
+        keep(kept, library.read_bytes())
+    library.write_bytes(kept.read_bytes())
     return library
 
 
