@@ -2,12 +2,14 @@
 
 LAPACK's driver for eigenvectors computes all of them, on both sides, which in a large system takes two fifths of its
 time. Here its steps are taken one by one: balancing, Hessenberg form, real Schur form A = Q·T·Qᵀ. They are those of the
-driver, so that the eigenvalues are the same to the last bit. Then only the wanted vectors are computed from T.
+driver, so that the eigenvalues are the same to the last bit. Then only the wanted vectors are computed from T. What
+a few vectors have of every mode comes from T's own eigenvectors, without A's.
 
 Other threads of Python run meanwhile, which they do not during SciPy's `eig`."""
 
 import ctypes
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -57,6 +59,53 @@ class RealSchur:
         left, right = self._columns(wanted, int(columns[np.flatnonzero(wanted)[-1]] + 2))
         values = self.values[places]
         return _as_complex(left, columns[first], values), _as_complex(right, columns[first], values)
+
+    def coordinates(self) -> "ModalCoordinates":
+        """Every mode as a coordinate; where A is defective, or nearly so, its numbers are large and cancel."""
+        if self._all is not None:
+            return ModalCoordinates(self.values.astype(complex), self._all[1])
+        n = len(self.values)
+        vectors, found, call = np.zeros((n, n), order="F"), ctypes.c_int(), _Call()
+        call(
+            "dtrevc",
+            side=b"R",
+            howmny=b"A",
+            select=np.ones(n, dtype=np.int32),
+            n=n,
+            t=self._T,
+            ldt=n,
+            vl=np.zeros((1, 1)),
+            ldvl=1,
+            vr=vectors,
+            ldvr=n,
+            mm=n,
+            m=found,
+            work=np.zeros(3 * n),
+        )
+        scale = self._unbalanced(np.ones((n, 1)), b"S")[:, 0]
+        # places are exact in floating point
+        order = self._unbalanced(np.arange(n, dtype=float)[:, None], b"P")[:, 0].astype(np.int64)
+        if not call.succeeded:
+            raise np.linalg.LinAlgError("LAPACK refuses to compute eigenvectors from a Schur form")
+        return ModalCoordinates(self.values, vectors, Turned(self._Q, order, scale[order]))
+
+    def _unbalanced(self, vectors: Matrix, job: bytes) -> Matrix:
+        """Vectors of the balanced matrix as those of A: scaled (S), put into A's order (P), or both (B)."""
+        n = len(self.values)
+        turned, call = np.array(vectors, order="F"), _Call()
+        call(
+            "dgebak",
+            job=job,
+            side=b"R",
+            n=n,
+            ilo=ctypes.c_int(self._low),
+            ihi=ctypes.c_int(self._high),
+            scale=self._scale,
+            m=turned.shape[1],
+            v=turned,
+            ldv=n,
+        )
+        return turned
 
     def _reduced(self, A: Matrix) -> bool:
         """Bring A to its Schur form; False if LAPACK does not succeed."""
@@ -117,6 +166,58 @@ class RealSchur:
         if not call.succeeded:
             raise np.linalg.LinAlgError("LAPACK refuses to compute eigenvectors from a Schur form")
         return whole[0], whole[1]
+
+
+@dataclass(frozen=True)
+class Turned:
+    """Basis of a Schur form in the coordinates of the matrix: row i is ``scale[i]`` times row ``order[i]`` of Q."""
+
+    Q: Matrix
+    order: NDArray[np.int64]
+    scale: Vector
+
+    def rows(self, C: Matrix) -> Matrix:
+        """C, shape (m, n), applied to the basis."""
+        balanced = np.zeros_like(C)
+        balanced[:, self.order] = C * self.scale
+        return np.asarray(balanced @ self.Q)
+
+    def columns(self, B: Matrix) -> Matrix:
+        """B, shape (n, m), in the basis."""
+        balanced = np.zeros_like(B)
+        balanced[self.order] = B / self.scale[:, None]
+        return np.asarray(self.Q.T @ balanced)
+
+
+class ModalCoordinates:
+    """Coordinates in which a real matrix A is the diagonal matrix of its eigenvalues.
+
+    ``vectors``: Right eigenvectors as columns: those of A, complex; or, with ``basis``, those of the Schur form as
+    LAPACK lays them out, real, two columns for a pair."""
+
+    def __init__(
+        self, values: NDArray[np.complex128], vectors: Vector, basis: Turned | None = None
+    ) -> None:
+        self.values, self._vectors, self._basis = values, vectors, basis
+        self._upper = np.flatnonzero(values.imag > 0)
+
+    def rows(self, C: Matrix) -> Vector:
+        """The modes as C, shape (m, n), sees them, shape (m, n)."""
+        if self._basis is None:
+            return np.asarray(C @ self._vectors)
+        found = (self._basis.rows(C) @ self._vectors).astype(complex)
+        first, second = found[:, self._upper], found[:, self._upper + 1]
+        found[:, self._upper], found[:, self._upper + 1] = first + 1j * second, first - 1j * second
+        return found
+
+    def columns(self, B: Matrix) -> Vector:
+        """How B, shape (n, m), drives each mode, shape (n, m). Raises NumPy's `LinAlgError` where A is defective."""
+        if self._basis is None:
+            return np.asarray(np.linalg.solve(self._vectors, B))
+        found = np.linalg.solve(self._vectors, self._basis.columns(B)).astype(complex)
+        first, second = found[self._upper] / 2, found[self._upper + 1] / 2
+        found[self._upper], found[self._upper + 1] = first - 1j * second, first + 1j * second
+        return np.asarray(found)
 
 
 @cache
