@@ -20,7 +20,7 @@ from orchestrator.linear.models.component_linearization import ComponentLineariz
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.linearization import Blocks, compose, continuous, where_given
 from orchestrator.linear.spectra.continuation import Eigenpair, follow_along
-from orchestrator.linear.spectra.modes import Mode, damping_ratio
+from orchestrator.linear.spectra.modes import Mode, Spectrum, damping_ratio
 from orchestrator.linear.spectra.slowest_decay import decay_of
 from orchestrator.linear.spectra.stability import spectrum_of
 from orchestrator.studies.pod_design.lead_lag import NO_COMPENSATION, LeadLag
@@ -150,15 +150,19 @@ class PodLoop:
         setting: PodSetting,
         values: NDArray[np.complex128] | None = None,
         modes: Sequence[Mode] | None = None,
+        *,
+        spectrum: Spectrum | None = None,
     ) -> Examination:
         """The verdict on the whole system with this setting, at any frequency, with its warnings.
 
         ``values``: all eigenvalues of a large system's step map with this setting [rad/s], where they are known; that
         the continuous system decays is then proved without all of its own.
-        ``modes``: the modes that must not depend on the perturbation, where they are known."""
+        ``modes``: the modes that must not depend on the perturbation, where they are known.
+        ``spectrum``: all eigenvalues of the step map with the modes of the range, where both are known."""
         system = where_given(lambda: self._continuous_model(setting))
         model = self._model(setting)
-        spectrum = None if values is None else spectrum_of(model, values)
+        if values is not None:
+            spectrum = spectrum_of(model, values)
         decay = None if values is None or system is None else decay_of(system, values)
         return examine(
             self._master,

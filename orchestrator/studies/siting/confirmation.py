@@ -268,13 +268,16 @@ def tuned_setting(
     while True:
         top = max(worth.values())
         equal = [one for one in settings if worth[one] > max(top - _GIVEN_UP, GROWS)] or settings
-        of_followed = {one: _of_followed(loop, start, one) for one in equal}
+        of_followed = {one: _of_followed(seen, start, one) for one in equal}
         best = min(equal, key=lambda one: (-round(of_followed[one] / _EQUAL), one.gain))
         deciding = [max(settings, key=lambda one: worth[one]), best, *_next_larger(best, settings)]
         unsure = [one for one in dict.fromkeys(deciding) if not seen.is_sure(one)]
-        if not unsure:
+        if unsure:
+            worth |= {one: seen.surely(one) for one in unsure}
+        elif seen.is_proved(best):
             return best, _search_end(best, settings, seen, most)
-        worth |= {one: seen.surely(one) for one in unsure}
+        else:
+            worth = {one: seen.of(one) for one in settings}
 
 
 def trial_of(tuned: PodSetting, by_gain: complex, eigenvalue: complex) -> PodSetting:
@@ -283,10 +286,10 @@ def trial_of(tuned: PodSetting, by_gain: complex, eigenvalue: complex) -> PodSet
     return replace(tuned, gain=min(tuned.gain, small))
 
 
-def _of_followed(loop: PodLoop, start: Placed, setting: PodSetting) -> float:
+def _of_followed(seen: LeastDamping, start: Placed, setting: PodSetting) -> float:
     """Damping ratio of the followed mode with a setting; −1 if it cannot be followed there."""
     try:
-        return damping_ratio(loop.place(start, setting.gain, setting.filters).eigenvalue)
+        return damping_ratio(seen.followed(start, setting))
     except AnalysisError:
         return -1.0
 

@@ -1,10 +1,13 @@
 """The least damping of a system with one setting of a POD after the other.
 
-Of a system with few states all eigenvalues are computed with each setting. In a large one the swings are followed from
-setting to setting, which says what grows among them, and nothing of what grows elsewhere: all eigenvalues are computed
-with those settings that decide."""
+Of a system with few states all eigenvalues are computed with each setting. In a larger one they come from one Schur
+form of the system without the controller's component, and are computed from the whole matrix with the setting that is
+chosen. In a very large one the swings are followed from setting to setting, which says what grows among them, and
+nothing of what grows elsewhere: all eigenvalues are computed with those settings that decide."""
 
 from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +15,8 @@ from numpy.typing import NDArray
 from orchestrator.core.errors import AnalysisError
 from orchestrator.core.threads import one_thread
 from orchestrator.linear.models.linear_model import LinearModel
+from orchestrator.linear.spectra.changed_spectra import ChangedSpectra, ChangedSpectrum
+from orchestrator.linear.spectra.continuation import Eigenpair, follow_along
 from orchestrator.linear.spectra.followed_swings import (
     follow_swings,
     search_swings,
@@ -22,13 +27,15 @@ from orchestrator.linear.spectra.mode_refinement import RefinedModes
 from orchestrator.linear.spectra.modes import (
     ELECTROMECHANICAL_HZ,
     Mode,
+    Spectrum,
     damping_ratio,
     eigenvalues,
+    find_spectrum,
     least_damped_first,
     make_mode,
 )
 from orchestrator.linear.spectra.stability import fastest_growth
-from orchestrator.studies.pod_design.closed_loop import PodLoop, PodSetting
+from orchestrator.studies.pod_design.closed_loop import Placed, PodLoop, PodSetting
 from orchestrator.studies.pod_design.guard import weakest_and_growing
 from orchestrator.studies.pod_design.lead_lag import NO_COMPENSATION
 
@@ -37,6 +44,13 @@ GROWS = -1.0  # in the place of a damping ratio, where something grows
 MOST_WHOLE = 3500
 """Up to this number of states all eigenvalues are computed with each setting. With 3,049 (WECC's 240 buses) they take
 8.3 to 9.2 s of processor time, and following 96 swings 11.4 s; the first grow with the third power of the states."""
+
+LEAST_CHANGED = 1_000
+"""From this number of states on, one Schur form serves all settings; with fewer, all eigenvalues take half a second at
+most. With 3,049 states the form takes 9.2 s of processor time, and each setting 0.4 s."""
+
+_NEIGHBOURS = 8  # pairs among which a mode is recognised
+_ALIKE = 1e-6  # the least damped mode in both ways differs by at most this part of its size
 
 
 class LeastDamping:
@@ -57,6 +71,14 @@ class LeastDamping:
         self._swings: dict[PodSetting, RefinedModes | None] = {}
         self._whole: dict[PodSetting, NDArray[np.complex128]] = {}
         self._found: dict[PodSetting, float] = {}
+        self._spectra: dict[
+            PodSetting, Spectrum
+        ] = {}  # with the swings, of settings that were proved
+        self._changed: dict[PodSetting, ChangedSpectrum] = {}
+        self._changes: ChangedSpectra | None = None
+        # a pair from which others are followed, and the same in the coordinates of the one form's modes
+        self._start: tuple[Eigenpair, Eigenpair] | None = None
+        self._is_changing = True  # whether one Schur form may serve all settings
 
     def of(self, setting: PodSetting) -> float:
         """The least damping ratio, `GROWS` where something is seen to grow.
@@ -80,28 +102,103 @@ class LeastDamping:
 
     def weakest(self, setting: PodSetting) -> complex | None:
         """The least damped mode [rad/s], by all eigenvalues; None where something grows."""
-        is_map = self._loop.model(setting).step_size is not None
-        weakest, growing = weakest_and_growing(
-            self.all_values(setting), step_map=is_map, within=self._within
-        )
+        if setting not in self._whole:
+            changed = self._changed_to(setting)
+            if changed is not None:
+                return self._weakest_of(changed.values)
+        return self._weakest_of(self.all_values(setting))
+
+    def _weakest_of(self, values: NDArray[np.complex128]) -> complex | None:
+        is_map = self._loop.model(PodSetting(0.0, NO_COMPENSATION)).step_size is not None
+        weakest, growing = weakest_and_growing(values, step_map=is_map, within=self._within)
         return weakest if growing is None else None
 
     def is_sure(self, setting: PodSetting) -> bool:
         """Tell whether growth at any frequency is known, or that something grows."""
-        return setting in self._whole or self._found.get(setting) == GROWS
+        known = setting in self._whole or setting in self._changed
+        return known or self._found.get(setting) == GROWS
+
+    def is_proved(self, setting: PodSetting) -> bool:
+        """Compute all eigenvalues from the whole matrix, and compare them with those by one form for all settings.
+
+        Where they differ, nothing of that form is used any more, and what was found by it is forgotten."""
+        by_changes = self._changed.get(setting)
+        if by_changes is None:
+            return True
+        one, other = self._weakest_of(by_changes.values), self._weakest_of(self.all_values(setting))
+        if one == other or (
+            one is not None and other is not None and abs(one - other) <= _ALIKE * abs(other)
+        ):
+            return True
+        self._forget_changes()
+        return False
+
+    def followed(self, start: Placed, setting: PodSetting) -> complex:
+        """The mode of a start with a gain of 0 where it is with another setting [rad/s].
+
+        Raises `AnalysisError` where it cannot be followed."""
+        if self._changed_to(setting) is None or self._changes is None:
+            return self._loop.place(start, setting.gain, setting.filters).eigenvalue
+        latest = setting
+
+        def model_at(gain: float) -> LinearModel:
+            nonlocal latest
+            latest = replace(setting, gain=gain)
+            return self._loop.model(latest)
+
+        def near(model: LinearModel, wanted: complex) -> Sequence[Eigenpair]:
+            changed = self._changed_to(latest)
+            if changed is None:
+                raise AnalysisError(f"with a gain of {latest.gain:g} the system has other modes")
+            return changed.pairs_near(wanted, _NEIGHBOURS)
+
+        if self._start is None or self._start[0] is not start.pair:
+            self._start = start.pair, self._changes.seen(start.pair)
+        return follow_along(self._start[1], model_at, 0.0, setting.gain, near=near).eigenvalue
+
+    def _changed_to(self, setting: PodSetting) -> ChangedSpectrum | None:
+        """All eigenvalues with a setting by one Schur form for all; None where that is not worthwhile, or fails."""
+        if setting in self._changed:
+            return self._changed[setting]
+        off = self._loop.model(PodSetting(0.0, NO_COMPENSATION))
+        within = LEAST_CHANGED <= len(off.names) <= MOST_WHOLE
+        if not (self._is_changing and within and setting.gain):
+            return None
+        model = self._loop.model(setting)
+        with suppress(AnalysisError, np.linalg.LinAlgError):
+            if self._changes is None:
+                self._changes = ChangedSpectra(off, model)
+            self._changed[setting] = self._changes.of(model)
+            return self._changed[setting]
+        self._forget_changes()
+        return None
+
+    def _forget_changes(self) -> None:
+        for setting in self._changed:
+            self._found.pop(setting, None)
+        self._changed.clear()
+        self._changes = None
+        self._start = None
+        self._is_changing = False
 
     def all_values(self, setting: PodSetting) -> NDArray[np.complex128]:
         """All eigenvalues [rad/s]."""
         if setting not in self._whole:
             with one_thread():
-                self._whole[setting] = eigenvalues(self._loop.model(setting))
+                model = self._loop.model(setting)
+                if setting in self._changed:  # it is chosen: its swings are asked for as well
+                    self._spectra[setting] = find_spectrum(model, *ELECTROMECHANICAL_HZ)
+                    self._whole[setting] = self._spectra[setting].eigenvalues
+                else:
+                    self._whole[setting] = eigenvalues(model)
         return self._whole[setting]
 
     def is_stable(self, setting: PodSetting) -> bool | None:
         """The verdict on the whole system, at any frequency; None where it is not known."""
         swings = self._swings.get(setting)
         if swings is None:
-            return self._loop.examine(setting).stability.stable
+            spectrum = self._spectra.get(setting)
+            return self._loop.examine(setting, spectrum=spectrum).stability.stable
         modes = _in_range(swings, self._loop.model(setting).names)
         return self._loop.examine(setting, self.all_values(setting), modes).stability.stable
 

@@ -1,4 +1,5 @@
-"""A POD's place by following the swings, as in a large network, and by all eigenvalues of every setting: the same."""
+"""A POD's place by following the swings, as in a large network, by one Schur form for all settings, and by all
+eigenvalues of every setting: the same."""
 
 import pytest
 
@@ -24,17 +25,26 @@ def settings(monkeypatch):
     return found
 
 
+def by_following(monkeypatch):
+    monkeypatch.setattr(least_damping, "MOST_WHOLE", 0)
+    monkeypatch.setattr(slowest_decay, "LEAST_STATES", 0)
+
+
+def by_one_form(monkeypatch):
+    monkeypatch.setattr(least_damping, "LEAST_CHANGED", 0)
+
+
 @pytest.mark.slow
+@pytest.mark.parametrize("way", [by_following, by_one_form])
 @pytest.mark.parametrize(
     ("case", "device"), [("wscc9", "pod_p"), ("wscc9", "pod_q"), ("ieee39", "pod_p")]
 )
-def test_a_place_has_the_same_figures_both_ways(case, device, settings, monkeypatch):
+def test_a_place_has_the_same_figures_both_ways(case, device, way, settings, monkeypatch):
     request = SiteRequest(device, confirm=1)
     whole = find_sites(load_case(case), request)
     every = len(settings)
     settings.clear()
-    monkeypatch.setattr(least_damping, "MOST_WHOLE", 0)
-    monkeypatch.setattr(slowest_decay, "LEAST_STATES", 0)
+    way(monkeypatch)
     followed = find_sites(load_case(case), request)
     assert len(settings) < every
     assert followed.ranking == whole.ranking

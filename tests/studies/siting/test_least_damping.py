@@ -1,13 +1,17 @@
 """A POD is set in a large system as by all eigenvalues of every setting, with few of them computed: planted growth."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra import followed_swings
+from orchestrator.linear.spectra.changed_spectra import ChangedSpectra
+from orchestrator.linear.spectra.continuation import pair_at
 from orchestrator.linear.spectra.mode_refinement import RefinedModes
-from orchestrator.studies.pod_design.closed_loop import PodSetting
+from orchestrator.studies.pod_design.closed_loop import Placed, PodSetting
 from orchestrator.studies.pod_design.lead_lag import NO_COMPENSATION
 from orchestrator.studies.siting import confirmation, least_damping
 from orchestrator.studies.siting.least_damping import GROWS, LeastDamping
@@ -49,7 +53,9 @@ class LargeLoop(Loop):
 
 
 def tuned(loop):
-    return confirmation.tuned_setting(loop, None, complex(-1.0), complex(0.0, Loop.SWING), 200.0)
+    off = PodSetting(0.0, NO_COMPENSATION)
+    start = Placed(off, pair_at(loop.model(off), complex(0.0, Loop.SWING)))
+    return confirmation.tuned_setting(loop, start, complex(-1.0), complex(0.0, Loop.SWING), 200.0)
 
 
 @pytest.fixture
@@ -117,3 +123,39 @@ def test_a_swing_that_was_not_among_those_followed_is_found(monkeypatch):
     assert followed_swings.follow_swings(model, whole) is not None
     assert followed_swings.follow_swings(model, some) is None
     assert LeastDamping(loop).of(PodSetting(50.0, NO_COMPENSATION)) == pytest.approx(0.01, abs=1e-9)
+
+
+@pytest.mark.parametrize("other", [lambda K: 0.15, lambda K: 0.09 - 4e-4 * K])
+def test_one_schur_form_leads_to_the_same_with_one_whole_spectrum(monkeypatch, spectra, other):
+    loop = LargeLoop(other)
+    expected = tuned(loop)
+    spectra.clear()
+    monkeypatch.setattr(least_damping, "LEAST_CHANGED", 0)
+    setting, end = tuned(loop)
+    assert setting == expected[0]
+    assert end.next_gain == expected[1].next_gain
+    assert end.next_mode == (
+        None if expected[1].next_mode is None else pytest.approx(expected[1].next_mode, abs=1e-7)
+    )
+    assert set(spectra) == {setting}
+
+
+def test_a_form_that_the_whole_spectrum_contradicts_is_given_up(monkeypatch, spectra):
+    """Planted: the form tells of most damping with a setting that is not the best."""
+    loop = LargeLoop(lambda K: 0.15)
+    expected = tuned(loop)
+    wrong = replace(expected[0], gain=12.5)
+    assert expected[0] != wrong
+    spectra.clear()
+    monkeypatch.setattr(least_damping, "LEAST_CHANGED", 0)
+    whole = ChangedSpectra.of
+
+    def planted(self, model):
+        found = whole(self, model)
+        if model is loop.model(wrong):
+            found.values = found.values - 20.0
+        return found
+
+    monkeypatch.setattr(ChangedSpectra, "of", planted)
+    assert tuned(loop) == expected
+    assert len(set(spectra)) == 15
