@@ -3,7 +3,7 @@
 Each loop is measured on the running FMU: from where its signal acts to its signal with unit gain and without lead/lag.
 Washout, filter and sign are the FMU's own. Only the gain and the lead/lag are put in between here."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,8 +11,12 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Complex, Matrix, Vector
+from orchestrator.linear.spectra.real_schur import RealSchur
 from orchestrator.studies.pod_design.closed_loop import PodSetting
 from orchestrator.studies.pod_design.lead_lag import LARGEST_STAGE_ANGLE, lead_lag_turning
+
+MOST_VECTORS = 2500
+"""Up to this number of states all eigenvectors of a system are computed; in larger ones those that are kept."""
 
 REDUCED = 300  # systems with more states are reduced to their slow modes
 # faster modes than this [rad/s] answer as they do at rest, unless loops move them
@@ -163,10 +167,11 @@ def _reduced(whole: OpenLoops) -> OpenLoops | None:
     A, U, V = whole.A, whole.U, whole.V
     seen = _seen_by(A, V)
     inner = A[np.ix_(seen, seen)]
-    values, right = np.linalg.eig(inner)
-    values, right = values.astype(complex), right.astype(complex)
-    rows = np.linalg.inv(right)
-    entries, exits = rows @ U[seen], V[:, seen] @ right
+    try:
+        modes = _Modes.of(inner, U[seen], V[:, seen])
+    except np.linalg.LinAlgError:
+        return None
+    values, entries, exits = modes.values, modes.entries, modes.exits
     reach = _GAIN * np.linalg.norm(entries, axis=1) * np.linalg.norm(exits, axis=0)
     fast, hertz = np.abs(values) > _FASTEST, np.abs(values.imag) / (2 * np.pi)
     moved = reach > _MOVED * np.maximum(np.abs(values), _SLOWEST)
@@ -174,7 +179,7 @@ def _reduced(whole: OpenLoops) -> OpenLoops | None:
     kept = swung | (~fast & (moved | ((hertz > _SEEN[0]) & (hertz < _SEEN[1]))))
     resting = fast & ~swung
     at_rest = -(exits[:, resting] / values[resting]) @ entries[resting]
-    matrix, there, back = _real_form(values[kept], rows[kept], right[:, kept])
+    matrix, there, back = _real_form(values[kept], *modes.vectors(kept))
     if np.abs(back @ inner @ there - matrix).max() > _TRUE * np.abs(inner).max():
         return None
     from_all, to_all = np.zeros((len(back), len(A))), np.zeros((len(A), len(back)))
@@ -192,6 +197,40 @@ def _reduced(whole: OpenLoops) -> OpenLoops | None:
         left=from_all,
         rest=rest,
     )
+
+
+@dataclass(frozen=True)
+class _Modes:
+    """Modes of a matrix: their eigenvalues [rad/s], how they are driven and what is seen of them, and the vectors of
+    some of them, rows and columns with rows·columns = 1."""
+
+    values: Complex
+    entries: Vector
+    exits: Vector
+    vectors: Callable[[NDArray[np.bool_]], tuple[Complex, Complex]]
+
+    @classmethod
+    def of(cls, A: Matrix, U: Matrix, V: Matrix) -> "_Modes":
+        if len(A) > MOST_VECTORS:
+            return cls._of_large(A, U, V)
+        values, right = np.linalg.eig(A)
+        values, right = values.astype(complex), right.astype(complex)
+        rows = np.linalg.inv(right)
+        return cls(values, rows @ U, V @ right, lambda kept: (rows[kept], right[:, kept]))
+
+    @classmethod
+    def _of_large(cls, A: Matrix, U: Matrix, V: Matrix) -> "_Modes":
+        """The same by a Schur form, with the vectors of those modes alone that are asked for."""
+        form = RealSchur(A)
+        coordinates = form.coordinates()
+
+        def vectors(kept: NDArray[np.bool_]) -> tuple[Complex, Complex]:
+            left, right = form.vectors(np.flatnonzero(kept).tolist())
+            rows = left.conj().T
+            return np.linalg.solve(rows @ right, rows), right
+
+        values = form.values.astype(complex)
+        return cls(values, coordinates.columns(U), coordinates.rows(V), vectors)
 
 
 def _seen_by(A: Matrix, V: Matrix) -> NDArray[np.bool_]:

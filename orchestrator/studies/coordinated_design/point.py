@@ -96,7 +96,8 @@ def _loop(master: Master, place: PodPlace, before: ComponentLinearization) -> tu
     return left[:, 0] * sizes[0], right[0]
 
 
-_MOST_STATES = 2500  # all eigenvalues of larger systems take too long for a design
+_MOST_STATES = 3500
+"""All eigenvalues of larger systems take too long for a design."""
 
 
 @dataclass(frozen=True)

@@ -128,6 +128,21 @@ def test_the_direct_term_of_a_reduced_system_has_the_right_sign(monkeypatch):
     assert abs(found["reduced"] - found["whole"]) < 0.1 * wrong
 
 
+def test_a_large_system_is_reduced_as_one_whose_vectors_are_all_computed(monkeypatch):
+    whole = close_modes(0)
+    monkeypatch.setattr(open_loops, "REDUCED", 5)
+    expected = open_loops._reduced(whole)
+    monkeypatch.setattr(open_loops, "MOST_VECTORS", 0)
+    monkeypatch.setattr(np.linalg, "eig", None)  # which gives the vectors of all
+    found = open_loops._reduced(whole)
+    assert len(found.A) == len(expected.A) < len(whole.A)
+    assert found.left @ found.right == pytest.approx(np.eye(len(found.A)), abs=1e-9)
+    for gain in (0.0, 90.0):
+        setting = {PLACE: PodSetting(gain, lead_lag_turning(40.0, 6.0, 2))}
+        one, other = (np.sort_complex(x.eigenvalues(setting)) for x in (found, expected))
+        assert one == pytest.approx(other, rel=1e-8)
+
+
 def test_a_signal_that_acts_on_itself_closes_as_the_algebra_says():
     """Where what a loop gives comes back at once, its gain is K/(1 − K·D)."""
     loops = close_modes(2)
