@@ -14,6 +14,7 @@ import zlib
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from xml.etree import ElementTree
 from xml.parsers import expat
@@ -27,6 +28,8 @@ MODEL_DESCRIPTION = "modelDescription.xml"
 MOST_FILES = 20_000
 MOST_BYTES = 2 * 1024**3  # size of everything in an archive, unpacked
 MOST_XML_BYTES = 64 * 1024**2
+KEPT_XML_BYTES = 1_000_000
+"""Of a document that is remembered once it was read; that of a large network takes much memory."""
 MOST_XML_DEPTH = 64
 MOST_XML_ELEMENTS = 600_000
 """Of one document: an FMU of about 200,000 variables, three elements each. A network of 9,241 buses has 484,788."""
@@ -70,7 +73,13 @@ _ON_WINDOWS = os.name == "nt"
 
 def read_model_description_text(path: Path) -> bytes:
     """The bytes of an FMU's modelDescription.xml, well-formed and without a document type."""
+    return names_and_description(path)[1]
+
+
+def names_and_description(path: Path) -> tuple[tuple[str, ...], bytes]:
+    """The names of an FMU's files, and that text: the archive is opened and judged once for both."""
     with _opened(path, with_backslashes=True) as archive:
+        names = _names(archive)
         try:
             entry = archive.getinfo(MODEL_DESCRIPTION)
         except KeyError:
@@ -84,8 +93,9 @@ def read_model_description_text(path: Path) -> bytes:
             )
         with archive.open(entry) as document:
             text = document.read(MOST_XML_BYTES + 1)
-    check_xml(path, MODEL_DESCRIPTION, text)
-    return text
+    check = _checked_before if len(text) <= KEPT_XML_BYTES else check_xml
+    check(path, MODEL_DESCRIPTION, text)
+    return names, text
 
 
 def read_member(path: Path, name: str, kind: str = "FMU") -> bytes | None:
@@ -100,7 +110,11 @@ def read_member(path: Path, name: str, kind: str = "FMU") -> bytes | None:
 def names_in(path: Path, kind: str = "FMU", *, with_backslashes: bool = False) -> tuple[str, ...]:
     """The names of an archive's files; those with backslashes between folders are an error unless asked for."""
     with _opened(path, kind, with_backslashes=with_backslashes) as archive:
-        return tuple(entry.orig_filename for entry in archive.infolist())
+        return _names(archive)
+
+
+def _names(archive: zipfile.ZipFile) -> tuple[str, ...]:
+    return tuple(entry.orig_filename for entry in archive.infolist())
 
 
 def listed_twice(path: Path) -> tuple[str, ...]:
@@ -168,6 +182,10 @@ def check_xml(path: Path, name: str, text: bytes) -> None:
         raise FmuFileError(
             f"{path}: {name} is not XML: {error_text(error)}; export it again"
         ) from error
+
+
+_checked_before = lru_cache(maxsize=32)(check_xml)
+"""For the newest documents that were in order: a study reads its device's file for every point."""
 
 
 @contextmanager

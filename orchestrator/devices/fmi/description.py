@@ -21,11 +21,11 @@ from orchestrator.core.foreign_files import one_line
 from orchestrator.core.uncollected import uncollected
 from orchestrator.devices.fmi.archive import (
     BACKSLASHES,
+    KEPT_XML_BYTES,
     MODEL_DESCRIPTION,
     PACK_AGAIN,
     error_text,
-    names_in,
-    read_model_description_text,
+    names_and_description,
 )
 from orchestrator.devices.fmi.clocks import FmiClock, clocks_of, special_variables
 from orchestrator.devices.fmi.values import Scalar, typed
@@ -207,9 +207,8 @@ def runs_under_wine(described: FmuDescription) -> bool:
 def read_declared(path: Path | str) -> FmuDescription:
     """The same as `read_description`, also where the FMU has no binary for this platform and cannot run here."""
     path = as_fmu(Path(path))
-    names = tuple(names_in(path, with_backslashes=True))
-    text = read_model_description_text(path)
-    parse = _parsed_before if len(text) <= _SMALL else parse_description
+    names, text = names_and_description(path)
+    parse = _parsed_before if len(text) <= KEPT_XML_BYTES else parse_description
     return parse(path, text, names)
 
 
@@ -259,8 +258,6 @@ def parse_description(path: Path, text: bytes, names: Sequence[str] = ()) -> Fmu
         )
     return replace(described, has_backslashes=any("\\" in name for name in names))
 
-
-_SMALL = 1_000_000  # bytes of a description that is kept: that of a large network takes much memory
 
 # the newest descriptions by all that they are made of: a study reads its device's file for every point
 _parsed_before = lru_cache(maxsize=32)(parse_description)

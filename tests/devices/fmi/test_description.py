@@ -8,6 +8,7 @@ import pytest
 
 from fmus.toolchain.catalogue import build_model
 from orchestrator.core.errors import FmuFileError, InputError
+from orchestrator.devices.fmi import archive
 from orchestrator.devices.fmi.archive import extract
 from orchestrator.devices.fmi.description import VariableInfo, read_declared, read_description
 from orchestrator.devices.sandbox import wine
@@ -360,3 +361,18 @@ def test_names_and_texts_that_steer_a_terminal_are_written_out(rewritten, capsys
     said = capsys.readouterr().out
     assert not re.search("[\r\x9b\u202e]", said)
     assert "\nstable" not in said
+
+
+def test_a_description_is_judged_once_and_again_where_it_changed(rewritten, monkeypatch):
+    """A study reads its device's file for every point."""
+    path = rewritten(lambda text: text.replace("<fmiModelDescription", "<fmiModelDescription ", 1))
+    first = read_declared(path)
+
+    def parser():
+        raise AssertionError("it was judged before")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(archive.expat, "ParserCreate", parser)
+        assert read_declared(path) is first
+    rewritten(lambda text: f"<!DOCTYPE x>{text.partition('?>')[2]}")
+    refused(path, "document type")
