@@ -18,7 +18,6 @@ from fmus.vendor_dll.reading import read_interface
 from orchestrator.core.errors import InputError
 from orchestrator.devices.sandbox import wine
 from orchestrator.devices.sandbox.access_restriction import confine_alone
-from orchestrator.devices.sandbox.compiled_programs import compile_programs
 from orchestrator.devices.sandbox.resource_limits import Limits, apply_limits
 
 PAGE = 4096  # the smallest page of the machines that are known [bytes]
@@ -174,6 +173,8 @@ def _loaded(library: Path, folder: Path, texts: list[str], note: Note) -> Librar
         apply_limits(Limits(), folder, own_users=True)
         confine_alone(folder, [library, *files])
         return LocalLibrary(library, note)
+    from orchestrator.devices.sandbox.compiled_programs import compile_programs  # noqa: PLC0415 - imports a compiler
+
     programs = compile_programs()
     confine_alone(folder, [library, *programs, *files], windows=True)
     from orchestrator.devices.sandbox.wine_program import WineLibrary  # noqa: PLC0415 - numpy brings threads, so after
