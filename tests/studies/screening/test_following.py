@@ -108,6 +108,24 @@ def test_a_lost_mode_is_searched_for(lost):
     assert found.grows == (lost.real > 0)
 
 
+@pytest.mark.parametrize("most_states", [0, 4000])
+def test_what_is_found_anew_is_the_same_by_a_search_and_among_all_eigenvalues(
+    most_states, monkeypatch
+):
+    here = system([*KNOWN, 0.02 + 4j])
+    monkeypatch.setattr("orchestrator.studies.screening.modes.MOST_COUNTED", most_states)
+    if most_states:
+        monkeypatch.setattr("orchestrator.studies.screening.modes.find_critical_modes", None)
+    found = find_modes_here(here, np.linalg.eigvals(here.A), REGION, None, count=True)
+    expected = find_spectrum(here, 0.1, 2.0).modes
+    held = [mode.eigenvalue for mode in expected if REGION.holds(mode.eigenvalue)]
+    assert len(held) == 6
+    assert found.searched
+    assert not found.looked_above
+    assert [found.modes.eigenvalues[k] for k in found.critical(REGION)] == pytest.approx(held)
+    assert found.growing_elsewhere == 0
+
+
 def test_nothing_is_searched_where_nothing_is_lost():
     found = find_modes_here(
         system(KNOWN), np.zeros(0), REGION, modes_of(system(KNOWN)), count=False
