@@ -94,6 +94,21 @@ def fmu_path():
     )
 
 
+@pytest.fixture(scope="module")
+def undrawn():
+    """Pictures are set up and written, but not drawn: that takes two thirds of a short run.
+
+    For modules whose subject is another one; `tests/studies/runs/test_signal_plots.py` and others look at pictures.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("matplotlib.figure.Figure.savefig", _write_empty)
+        yield
+
+
+def _write_empty(figure, file, **how):
+    file.write(b"\x89PNG")
+
+
 @pytest.fixture
 def gfor(capsys):
     """Run the command; returns exit code, standard output and standard error."""

@@ -15,6 +15,8 @@ from orchestrator.cases.case import BUILT_IN
 from orchestrator.cases.form.given import path_of_given
 from orchestrator.core.errors import CaseError, InputError
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 @pytest.fixture(scope="module")
 def case():

@@ -11,6 +11,8 @@ from orchestrator.face.cli.design import _writable
 from orchestrator.output.results.manifest import MANIFEST, read_manifest
 from orchestrator.output.results.staging import staged
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 CASE = '[network]\nraw = "net.raw"\n'
 DESIGN = ("design", "case.toml", "--controller", "pod_p")
 

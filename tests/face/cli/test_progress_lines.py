@@ -13,6 +13,8 @@ from orchestrator.studies.points.parts_done import counting, join, parts_done, t
 from orchestrator.studies.siting.machines import find_machines
 from orchestrator.studies.siting.study import SiteRequest, find_sites
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 POINTS = "time,grid.X_L\n" + "".join(f"{k},{0.1 + 0.01 * k}\n" for k in range(6))
 
 

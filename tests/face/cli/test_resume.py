@@ -16,9 +16,12 @@ from orchestrator.cases.case import BUILT_IN
 from orchestrator.face.cli.checkpoints import StudyCheckpoints
 from orchestrator.output.results.staging import mend, staged
 
-pytestmark = pytest.mark.skipif(
-    sys.platform == "win32", reason="no process can be sent these signals there"
-)
+pytestmark = [
+    pytest.mark.usefixtures("undrawn"),
+    pytest.mark.skipif(
+        sys.platform == "win32", reason="no process can be sent these signals there"
+    ),
+]
 
 EVENT = """
 [[events]]

@@ -20,6 +20,8 @@ from tests.face.cli.test_resume import checkpoints_in
 
 fcntl = pytest.importorskip("fcntl", reason="Windows has no such lock")
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 SHORT = ("run", "infinite_bus", "--scenario", "dip", "--stop", "0.1")
 
 

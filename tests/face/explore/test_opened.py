@@ -14,6 +14,8 @@ from orchestrator.face.explore.worker import Desk
 from orchestrator.output.results.csv_recording import read_table
 from tests.studies.certification.test_issued import a_damping, an_eigenvalue, forged, issued
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 __all__ = ["issued"]
 
 
