@@ -18,16 +18,18 @@ from tests.benchmarks.validation_draws import TRUTH, starts_of
 from tests.studies.validation.recordings import of_pmu, run, table, with_noise, written
 
 ON = {"pod_p.enabled": True}
+STEP = "500 us"
+"""Of the device in fits, each of which drives it 10 to 100 times."""
 
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
-    clean = table(run("pod_p", gfor__pod_p__K=120.0))
-    return written(with_noise(clean), tmp_path_factory.mktemp("fit"))
+    noisy = with_noise(table(run("pod_p", gfor__pod_p__K=120.0)))
+    return written(noisy[noisy.time <= 4.0], tmp_path_factory.mktemp("fit"))
 
 
 def test_a_gain_is_found_within_its_interval(gfor, recording):
-    options = ("--set", "pod_p.enabled=true", "--fit", "pod_p.K", "--json")
+    options = ("--set", "pod_p.enabled=true", "--fit", "pod_p.K", "--step", STEP, "--json")
     code, out, _ = gfor("validate", "gfor", str(recording), *options)
     assert code == 0
     (found,) = json.loads(out)["fit"]
@@ -42,9 +44,8 @@ def test_a_gain_is_found_within_its_interval(gfor, recording):
 def test_intervals_beside_an_error_that_stays_do_not_hold(recording, monkeypatch):
     """Its droop is wrong, which the fit of a gain cannot mend; other starts find no more."""
     monkeypatch.setattr(fit, "_starts", lambda residuals, told, switches: iter([told]))
-    frame = pd.read_csv(recording, index_col="time").loc[:3.0]
-    given = {"values": ON | {"droop.R_f": 0.09}, "fit": "pod_p.K", "step": "500 us"}
-    found = gfor_in_python.validate("gfor", frame, **given)
+    given = {"values": ON | {"droop.R_f": 0.09}, "fit": "pod_p.K", "step": STEP}
+    found = gfor_in_python.validate("gfor", recording, **given)
     assert not found.result.fit.reached
     assert not found.as_json()["fit"][0]["holds"]
     assert "95 %, does not hold" in found.html()
@@ -65,14 +66,16 @@ def test_what_did_not_run_is_counted_where_something_is_asked_or_searched(record
 
 
 def test_a_switched_off_controller_is_seen_and_its_gain_with_it(recording):
-    found = gfor_in_python.validate("gfor", recording, fit="pod_p.enabled, pod_p.K").fitted()
+    wanted = "pod_p.enabled, pod_p.K"
+    found = gfor_in_python.validate("gfor", recording, fit=wanted, step=STEP).fitted()
     by_name = found.set_index("parameter")
     assert bool(by_name.loc["pod_p.enabled", "value"]) is True
     assert by_name.loc["pod_p.K", "value"] == pytest.approx(120, rel=0.05)
 
 
 def test_what_moves_nothing_is_named_before_the_fit_and_left(recording):
-    found = gfor_in_python.validate("gfor", recording, values=ON, fit="pod_q.K, pod_p.K").fitted()
+    given = {"values": ON, "fit": "pod_q.K, pod_p.K", "step": STEP}
+    found = gfor_in_python.validate("gfor", recording, **given).fitted()
     by_name = found.set_index("parameter")
     assert not by_name.loc["pod_q.K", "identifiable"]
     assert by_name.loc["pod_q.K", "why_not"] == "no effect"
@@ -107,6 +110,7 @@ def test_an_event_that_is_kept_back_confirms_the_fit(gfor, recording, tmp_path):
     other = with_noise(table(run("pod_p", scale=0.95, gfor__pod_p__K=120.0)), 2)
     kept = written(other, tmp_path, "other.csv")
     options = ("--set", "pod_p.enabled=true", "--set", "pod_p.K=60", "--fit", "pod_p.K")
+    options += ("--step", STEP)
     code, out, _ = gfor(
         "validate", "gfor", str(recording), *options, "--hold-back", str(kept), "--json"
     )
@@ -125,8 +129,8 @@ def test_an_interrupted_fit_keeps_the_best_values_so_far(recording):
         if sum(one.startswith("fit:") for one in said) == 2:
             raise KeyboardInterrupt
 
-    values = ON | {"pod_p.K": 60.0}
-    found = gfor_in_python.validate("gfor", recording, values=values, fit="pod_p.K", report=report)
+    given = {"values": ON | {"pod_p.K": 60.0}, "fit": "pod_p.K", "step": STEP}
+    found = gfor_in_python.validate("gfor", recording, report=report, **given)
     content = found.as_json()
     assert content["fit_finished"] is False
     (one,) = content["fit"]
@@ -144,7 +148,7 @@ def test_the_command_ends_an_interrupted_fit_with_its_figures(gfor, recording, m
         raise KeyboardInterrupt
 
     monkeypatch.setattr(fit, "_least_squares", stopped)
-    options = ("--set", "pod_p.enabled=true", "--fit", "pod_p.K", "--json")
+    options = ("--set", "pod_p.enabled=true", "--fit", "pod_p.K", "--step", STEP, "--json")
     code, out, _ = gfor("validate", "gfor", str(recording), *options)
     assert code == INTERRUPTED
     assert json.loads(out)["fit"][0]["value"] == 100

@@ -7,7 +7,7 @@ import orchestrator as gfor_in_python
 from tests.studies.validation.recordings import NOISE, run, table, with_noise
 
 ON = {"pod_p.enabled": True}
-STEP = "200 us"
+STEP = "500 us"
 
 
 @pytest.fixture(scope="module")
