@@ -136,8 +136,9 @@ class LinearModel:
         return spla.splu(sp.csc_array(sp.eye_array(m) - self.K)).solve if m else lambda b: b
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but the factorisation, which cannot be pickled or copied, and is made anew where it is needed."""
-        return {name: value for name, value in vars(self).items() if name not in ("settle", "hub")}
+        """All but what is made anew where it is needed: a factorisation cannot be pickled or copied."""
+        anew = ("settle", "hub", "_diagonal", "_with_gaps")
+        return {name: value for name, value in vars(self).items() if name not in anew}
 
     @cached_property
     def hub(self) -> HubEquations | None:
@@ -167,10 +168,7 @@ class LinearModel:
                 takes_many=self.is_searched_in_blocks,
             )
         n, m = self.G.shape
-        identity_n, identity_m = sp.eye_array(n), sp.eye_array(m)
-        whole = sp.block_array(
-            [[self.F - sigma * identity_n, self.G], [self.H, self.K - identity_m]], format="csc"
-        )
+        whole = self._equations_at(sigma)
         factors = spla.splu(whole)
         kind = whole.dtype
 
@@ -184,6 +182,36 @@ class LinearModel:
 
         return ShiftedSolver(
             solve, solve_adjoint, solve_exactly=solve, solve_adjoint_exactly=solve_adjoint
+        )
+
+    def _equations_at(self, sigma: complex) -> sp.csc_array:
+        """A − σI in sparse equations; of those for another σ only the diagonal is another."""
+        own = self._diagonal - sigma
+        equations, places = self._with_gaps
+        if len(places) != len(own) or not own.all():  # an entry that is zero is left out
+            return self._assembled(sigma)
+        values = equations.data.astype(own.dtype)
+        values[places] = own
+        return sp.csc_array((values, equations.indices, equations.indptr), shape=equations.shape)
+
+    @cached_property
+    def _diagonal(self) -> Vector:
+        return np.asarray(self.F.diagonal())
+
+    @cached_property
+    def _with_gaps(self) -> tuple[sp.csc_array, NDArray[np.intp]]:
+        """The equations with gaps for the diagonal of A − σI, and the gaps' places among their values."""
+        equations = self._assembled(np.nan)
+        equations.sum_duplicates()  # which sorts them, as a factorisation would in place
+        return equations, np.flatnonzero(np.isnan(equations.data))
+
+    def _assembled(self, sigma: complex) -> sp.csc_array:
+        n, m = self.G.shape
+        identity_n, identity_m = sp.eye_array(n), sp.eye_array(m)
+        return sp.csc_array(
+            sp.block_array(
+                [[self.F - sigma * identity_n, self.G], [self.H, self.K - identity_m]], format="csc"
+            )
         )
 
     def solver_beside(self, sigma: complex) -> Callable[[Vector], Vector] | None:
