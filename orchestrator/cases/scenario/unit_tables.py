@@ -24,6 +24,7 @@ from orchestrator.cases.form.schema import ComponentTable, UnitsTable
 from orchestrator.cases.form.unusual_value import UnusualValue
 from orchestrator.cases.networks.conversion import Generation
 from orchestrator.cases.networks.data import bus_name
+from orchestrator.cases.networks.psse.dyr_counts import with_needed_counts
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, read_dyr
 from orchestrator.cases.networks.psse.dyr_units import (
     at_their_devices,
@@ -299,7 +300,8 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> tuple[list[UnitRow], Sequen
     alphas = _alphas(draft, table, rows)
     replaced = [row.label for row in rows if alphas[row.label] == 1]
     idle = draft.data.idle_machines if draft.data else ()
-    records = named_by_bus(at_their_devices(read_dyr(path), machines), table.dyr_leave_out)
+    read = with_needed_counts(read_dyr(path))
+    records = named_by_bus(at_their_devices(read, machines), table.dyr_leave_out)
     keys = [(machine.bus, machine.name.strip()) for machine in machines]
     ours = {key for key, row in zip(keys, rows, strict=True) if row.label in table.replace}
     refusals = Refusals()

@@ -56,6 +56,8 @@ class DynamicRecord:
     line_of_dc: str = (
         ""  # name of the DC line or FACTS device that a record is of, in the place of its bus
     )
+    surplus: tuple[str, ...] = ()  # values that its model has no fields for, and that are not used
+    lacking: int = 0  # how many of its last values are missing, and are taken as 0
 
     @property
     def place(self) -> str:

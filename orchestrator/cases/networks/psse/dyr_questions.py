@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from fmus.grid_following.dyr_approximation import FIELDS
 from fmus.synchronous_generator.dyr_records import DYR_RECORDS
 from fmus.toolchain.dyr_form import DyrField
+from orchestrator.cases.networks.psse.dyr_counts import doubt_of_count
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, given_values
 from orchestrator.cases.networks.psse.dyr_unit_records import RECORDS_OF_UNITS
 from orchestrator.cases.networks.psse.dyr_values import CEILING, FLOOR, chosen_ceiling
@@ -37,6 +38,7 @@ _SAME = 1e-3  # part by which two figures for one reactance may differ: files ro
 def doubts_of_machine(
     machine: Machine, records: Sequence[DynamicRecord], values: Mapping[str, float]
 ) -> Iterator[DoubtOfRecord]:
+    yield from (doubt for record in records if (doubt := doubt_of_count(record)))
     yield from _omissions(records)
     yield from _leads_without_lags(records)
     yield from _chosen_limits(records)

@@ -75,6 +75,34 @@ def test_records_become_parts_and_parameters(tables):
     assert first.parameters["machine.R_s"] == 0
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "2.35 0.0 /",
+            "2.35 0.0 0.05 /",
+            "GENCLS has 3 values, and needs 2: what follows them (0.05)",
+        ),
+        (
+            "2.1 7.0 0.0 /",
+            "2.1 7.0 /",
+            "TGOV1 has 6 values, and needs 7: the others (Dt) are taken",
+        ),
+    ],
+)
+def test_a_record_with_a_value_more_or_less_is_read_and_asked_about(
+    old, new, said, tables, tmp_path
+):
+    whole = tables()
+    found = tables(DYR.replace(old, new))
+    assert [each.parameters for each in found.values()] == [
+        each.parameters for each in whole.values()
+    ]
+    (ready,) = load_case(tmp_path / "case.toml").prepare(["plain"])
+    (asked,) = (str(question) for question in ready.questions if "and needs" in str(question))
+    assert said in asked
+
+
 def test_a_machine_out_of_service_may_have_records(tables, tmp_path):
     found = records(33)
     found["GENERATOR"].append(
@@ -110,7 +138,7 @@ def test_records_over_lines_with_commas_or_blanks(tmp_path):
         ("2.35 0.0 /", "2.35 /", r"line 5: GENCLS has 1 values, and needs 2: H, D"),
         ("7.0 0.0 /", "7.0 0.0", r"grid.dyr, line 7: the record does not end with a slash"),
         ("3 'GENCLS'", "three 'GENCLS'", r"line 5: .* is no record; one is bus 'MODEL' id values"),
-        ("2.35 0.0 /", "2.35 0.0 1.0 /", r"line 5: GENCLS has 3 values, and needs 2: H, D"),
+        ("3 'GENCLS' 1  2.35 0.0", "3 'TGOV1' 1", r"line 5: TGOV1 has 0 values, and needs 7: R, "),
         (
             "2.35 0.0 /",
             "2.35 0.0",

@@ -317,10 +317,10 @@ def test_records_that_lack_something_are_named(lines, words, prepared):
 
 
 def test_a_shaft_that_cannot_be_read_names_what_goes_with_it(prepared):
-    """Planted: a value too few in WTDTA1. The case that takes the remedy as it stands is read in one round."""
-    short = OF_GRIDPACK[3].replace(" 0 0 0 /", " 0 0 /")
+    """Planted: no number in WTDTA1. The case that takes the remedy as it stands is read in one round."""
+    short = OF_GRIDPACK[3].replace(" 0 0 0 /", " 0 0 x /")
     lines = with_records(OF_REGCA1, line("REECA1", BATTERY), *OF_GRIDPACK[:3], short)
-    with pytest.raises(CaseError, match="WTDTA1 has 4 values, and needs 5") as refused:
+    with pytest.raises(CaseError, match="WTDTA1 has Dshaft = 'x'; it must be a number") as refused:
         prepared(lines, "")
     told = re.search(
         r"to leave out WTDTA1, .*: write (dyr_leave_out = \[.*?\])", str(refused.value)
@@ -331,11 +331,25 @@ def test_a_shaft_that_cannot_be_read_names_what_goes_with_it(prepared):
 
 
 def test_a_record_that_cannot_be_read_beside_a_good_shaft_names_nothing_else(prepared):
-    slope = OF_GRIDPACK[0].replace("0.007", "0.007 0")
+    slope = OF_GRIDPACK[0].replace(" 1 0.007", " x 0.007")
     lines = with_records(OF_REGCA1, line("REECA1", BATTERY), slope, *OF_GRIDPACK[1:])
-    with pytest.raises(CaseError, match="WTARA1 has 3 values, and needs 2") as refused:
+    with pytest.raises(CaseError, match="WTARA1 has Ka = 'x'") as refused:
         prepared(lines, "")
     assert "to leave out" not in str(refused.value)
+
+
+def test_values_too_many_or_too_few_are_asked_about(prepared):
+    """As GridPACK's two areas with wind turbines have them: three values of WTARA1, four of WTDTA1."""
+    slope = OF_GRIDPACK[0].replace("0.007", "0.007 0")
+    short = OF_GRIDPACK[3].replace(" 0 0 0 /", " 0 0 /")
+    lines = (OF_REGCA1, line("REECA1", BATTERY))
+    found = prepared(with_records(*lines, slope, *OF_GRIDPACK[1:3], short), "")
+    asked = [str(question) for question in found.questions if "and needs" in str(question)]
+    assert len(asked) == 2
+    assert "WTARA1 has 3 values, and needs 2: what follows them (0) is not used" in asked[0]
+    assert "WTDTA1 has 4 values, and needs 5: the others (Dshaft) are taken as 0" in asked[1]
+    whole = prepared(with_records(*lines, *OF_GRIDPACK), "")
+    assert unit(found).parameters == unit(whole).parameters
 
 
 GOVERNORS = tuple(f"{bus} 'TGOV1' 1 0.05 0.5 1 0 1 3 0" for bus in (1, 2))
