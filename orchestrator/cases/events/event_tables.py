@@ -131,7 +131,9 @@ def _endless(table: schema.EventTable, stop: float) -> Iterator[str]:
 
 
 def _elsewhere(table: schema.EventTable, network: Network | None) -> Iterator[str]:
-    """Questions about a fault at a bus that ends though what leads to it stays closed."""
+    """Questions about a fault that ends though what leads to it stays closed."""
+    if isinstance(table, schema.LineFaultTable) and network is not None:
+        yield from _beside_a_closed_end(table, network)
     if (
         isinstance(table, schema.BusFaultTable)
         and table.cleared_by is not None
@@ -146,6 +148,18 @@ def _elsewhere(table: schema.EventTable, network: Network | None) -> Iterator[st
         elif ends and table.opens_at not in (None, table.bus):
             text = f"{table.cleared_by} opens at {table.opens_at} alone, and stays joined to {table.bus}"
             yield f"{text}, where the fault goes away; is its end at {table.bus} meant?"
+
+
+def _beside_a_closed_end(table: schema.LineFaultTable, network: Network) -> Iterator[str]:
+    """Questions about a fault along a line that ends as one end of the line opens."""
+    line = next((line for line in network.lines if line.name == table.line), None)
+    if table.opens_at is None or table.duration is None or line is None:
+        return
+    other = line.to_bus if table.opens_at == line.from_bus else line.from_bus
+    yield (
+        f"{table.line} opens at {table.opens_at} alone: the fault along it ends with that, where a real one lasts "
+        f"until its end at {other} opens too; is opens_at meant? Without it the line opens at both ends"
+    )
 
 
 def _all_events_of(

@@ -286,6 +286,23 @@ def test_a_line_opens_at_one_end_and_its_modes_are_of_that_network(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("opens", "asked"),
+    [
+        ("opens it at b3", True),
+        ("1-phase, opens one pole at b3, recloses after 0.5 s", True),
+        ("opens it", False),
+    ],
+)
+def test_a_fault_along_a_line_that_ends_as_one_end_opens_is_asked_about(opens, asked, tmp_path):
+    prepared(tmp_path, "")
+    fault = f"l31 at 40 %, 50 ms, {opens}, from 0.1 s"
+    (ready,) = with_events(load_case(tmp_path / "case.toml"), [], [fault]).prepare(stop_time=2.0)
+    said = "l31 opens at b3 alone: the fault along it ends with that, where a real one lasts until "
+    said += "its end at b1 opens too"
+    assert any(said in str(q) for q in ready.questions) == asked
+
+
+@pytest.mark.parametrize(
     "fault",
     ["l31 at 40 %, 50 ms, opens it at b3", "b3, 50 ms, opens l31 at b3, from 0.2 s"],
     ids=["along the line", "at the bus"],
