@@ -8,6 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from fmus.grid.network import Load
+from fmus.grid_following.dyr_approximation import MODEL as APPROXIMATION
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.flow.source_impedances import source_impedance
 from orchestrator.cases.form.csv_rows import rows_of
@@ -121,6 +122,13 @@ class CaseText:
             lines.append(line + " (--details lists them)" * any(details(records)))
         more = f"{questions} question{'s' * (questions != 1)} about the data: comments at their lines in the file"
         return [*lines, more] if questions else lines
+
+    @property
+    def _approximation(self) -> str:
+        """Tell that converters of the files are approximated, for the end of a title."""
+        plans = self._base.system.components.values() if self._base else ()
+        stands = any(plan.description.model_name == APPROXIMATION for plan in plans)
+        return ", with WECC's converters approximated" if stands else ""
 
     @property
     def _replacements(self) -> str:
@@ -377,7 +385,7 @@ class CaseText:
     def _scenarios(self) -> list[list[str]]:
         devices = [x for place in self._places for x in (place.name, place.injection)]
         removed = [f"remove = {_toml_list(devices)}"] if devices else []
-        title = f"As in the files{self._replacements}"
+        title = f"As in the files{self._approximation}{self._replacements}"
         found = [["[scenarios.base]", f"title = {_quoted(title)}", *removed]]
         if self._base is None or self._network is None:
             return [*found, self._fault()] if self._fault_bus else found

@@ -225,3 +225,15 @@ def test_the_system_with_it_has_a_steady_state_and_damped_modes(step, prepared, 
 def test_a_record_has_the_fields_of_the_program(name, flags, numbers):
     """ICONs and CONs of PSS/E's model library; no field stands twice."""
     assert len(FIELDS[name]) == len(set(FIELDS[name])) == flags + numbers
+
+
+@pytest.mark.parametrize("approximates", [True, False])
+def test_the_title_of_a_new_case_tells_of_the_approximation(approximates, tmp_path, gfor):
+    (tmp_path / "grid.raw").write_text(raw(33))
+    (tmp_path / "grid.dyr").write_text(dyr() if approximates else DYR)
+    case = tmp_path / "case.toml"
+    files = (tmp_path / "grid.raw", tmp_path / "grid.dyr")
+    code, _, error = gfor("new", *files, "--dyr-approximate", "--out", case)
+    assert code == 0, error
+    title = "As in the files" + ", with WECC's converters approximated" * approximates
+    assert f'title = "{title}"' in case.read_text()
