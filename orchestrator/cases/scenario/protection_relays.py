@@ -196,7 +196,10 @@ def _high_sides(network: Network, units: Mapping[str, str]) -> dict[str, str]:
 
 
 def take_wind_turbines(draft: Draft, records: Sequence[DynamicRecord]) -> None:
-    """Give the draft the units that have a record of a wind turbine; one that the case leaves out counts as well."""
+    """Give the draft the units that have a record of a wind turbine.
+
+    One that the case leaves out counts as well, and so does that of a machine in whose place a converter stands: what
+    drives the plant is the same."""
     labels = unit_labels(draft.data.machines) if draft.data else {}
     machines = {(record.bus, record.machine) for record in records if record.name.startswith(_WIND)}
     draft.wind_turbines = {label for machine, label in labels.items() if machine in machines}

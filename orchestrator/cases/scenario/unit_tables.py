@@ -419,7 +419,7 @@ def _account(
         taken |= take_dc_lines(draft, table, wanted)
     with refusals.keep():
         relays = take_relays(draft, wanted)
-    take_wind_turbines(draft, [x for x in records if (x.bus, x.machine) not in ours])
+    take_wind_turbines(draft, records)
     refusals.tell()
     taken |= relays.places
     uses = [

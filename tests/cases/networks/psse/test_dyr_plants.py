@@ -282,6 +282,18 @@ def test_a_wind_plant_stays_one_where_its_turbine_is_left_out(left_out, prepared
     assert {relay.record for relay in ready.relays} == {"PRC-029 for wind"}
 
 
+def test_a_wind_plant_stays_one_where_a_converter_of_ours_replaces_it(prepared, tmp_path):
+    """What drives the plant is the same, and so is the region in which it may not trip."""
+    made = MADE["REGCA1 REECA1 WTDTA1 WTARA1 WTPTA1 WTTQA1"]
+    prepared(with_records(*made), "")
+    case = tmp_path / "case.toml"
+    text = case.read_text().replace("[units]", '[units]\nreplace = ["3"]')
+    case.write_text(text.replace('converter = "gfor"', 'converter = "gfor_phasor"'))
+    (ready,) = with_protection(load_case(case), "prc029").prepare()
+    assert unit(ready).description.model_name == "gfor_phasor"
+    assert {relay.record for relay in ready.relays} == {"PRC-029 for wind"}
+
+
 @pytest.mark.parametrize("records", [name for name in MADE if "elsewhere" not in name])
 @pytest.mark.slow
 def test_the_system_with_such_a_plant_has_modes_and_a_run(records, prepared, tmp_path, gfor):
