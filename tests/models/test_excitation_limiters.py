@@ -236,9 +236,9 @@ AT_GATES = [
 
 @pytest.mark.parametrize(("name", "gate"), AT_GATES)
 def test_at_a_gate_the_higher_signal_drives_the_exciter(name, gate):
-    """Outside of the circle the exciter follows the limiter; within it, it is the exciter without one."""
+    """Within the circle it is the exciter without one; a start outside rests, and beyond it the limiter drives."""
     on = {"uel.gate": gate, "uel.K_UL": 99.0, "uel.T_U2": 0.0}
-    outside = {"uel.K_UR": 0.5, "uel.K_UC": 0.0}
+    outside = {"uel.K_UR": 0.5, "uel.K_UC": 0.0, "uel.V_UIMAX": 999.0, "uel.V_ULMAX": 999.0}
     at = [BUS.real, BUS.imag]
     device = Evaluated(synchronous_generator_phasor(exciter=name, uel="uel1"), AT_BUS | on)
     assert not refused(device)
@@ -254,9 +254,30 @@ def test_at_a_gate_the_higher_signal_drives_the_exciter(name, gate):
     lifted = Evaluated(
         synchronous_generator_phasor(exciter=name, uel="uel1"), AT_BUS | on | outside
     )
-    assert lifted.outputs(at)["uel.acts"] == 1
-    rises = lifted.outputs(at)["E_fd"] - free.outputs(at)["E_fd"]
-    assert max(rises, *lifted.rates(at).values()) > 0.1
+    assert not refused(lifted)
+    assert max(map(abs, lifted.rates(at).values())) < 1e-8
+    assert lifted.outputs(at)["uel.acts"] == 0
+    more = [0.99 * BUS.real, 0.99 * BUS.imag]  # the current rises with it
+    assert lifted.outputs(more)["uel.acts"] == 1
+    rises = lifted.outputs(more)["E_fd"] - free.outputs(more)["E_fd"]
+    driven, own = lifted.rates(more), free.rates(more)
+    assert max(rises, *(driven[name] - own[name] for name in own)) > 0.1
+
+
+@pytest.mark.parametrize("name", ["uel1", "uel2", "uel2c"])
+def test_a_start_beyond_the_edge_of_an_integral_rests_and_beyond_it_integrates(name):
+    """|i| = 0.71 pu exceeds K_UR·v at the start, and Q = 0.1 pu is below the polygon at 0.3 pu."""
+    values = {"K_UI": 1.0, "K_UL": 1.0, "V_UIMIN": 0.0, "T_U2": 0.0}
+    circle = {"K_UR": 0.5, "K_UC": 0.0, "V_ULMIN": 0.0}
+    values |= circle if name == "uel1" else {f"Q{k}": 0.3 for k in range(5)}
+    alone = limiter(values, uel=UELS[name])
+    assert not refused(alone)
+    rest = [E_FD, E_FD, CURRENT.re, CURRENT.im]
+    assert max(map(abs, alone.rates(rest).values())) < 1e-9
+    assert alone.outputs(rest)["v_s"] == 0
+    more = [E_FD, E_FD, 0.9, 0.2]  # a larger current, with less reactive power
+    found, _ = integrated(alone, lambda t: more, 2.0)
+    assert found[-1]["v_s"] > 0.1
 
 
 def test_a_machine_that_is_asked_for_too_little_follows_its_limiter_at_a_gate(tmp_path):

@@ -33,26 +33,38 @@ E_FD = "E_fd"
 BEFORE = 1  # place of a gate: before an exciter's amplifier
 BEHIND = 2  # place of a gate: behind it
 
+_HEADROOM = 1e-3
+"""By which a limiter's signal lies below the exciter's at a gate where the operating point is beyond it [pu]."""
+
 
 @dataclass(frozen=True)
 class Gate:
     """A limiter's signal that lifts an exciter's own at a gate of the higher value.
 
-    ``signal``: the limiter's; ``place``: `BEFORE`, `BEHIND`, or 0 for no gate; ``met``: the exciter's own signals, by
-    the places that its diagram has."""
+    ``signal``: the limiter's, ``at_start``: in the operating point; ``place``: `BEFORE`, `BEHIND`, or 0 for no gate;
+    ``met``: the exciter's own signals, by the places that its diagram has; ``lowered``: by how much the limiter's is
+    lowered there, so that it does not act in the operating point, where the exciter's is what the machine needs."""
 
     signal: Expr
+    at_start: Scalar
     place: Expr
     met: dict[int, Expr] = field(default_factory=dict)
+    lowered: dict[int, Expr] = field(default_factory=dict)
 
     def is_at(self, place: int) -> Expr:
         """Return whether the limiter acts at a place."""
         return logic_and(self.place > place - 0.5, self.place < place + 0.5)
 
-    def lift(self, own: Expr, place: int) -> Expr:
-        """Return the higher one of both signals at a place of the exciter's diagram."""
+    def lift(self, own: Expr, place: int, at_start: Scalar) -> Expr:
+        """Return the higher one of both signals at a place of the exciter's diagram; ``at_start``: its own there."""
+        above = Expr(self.at_start) - at_start
         self.met[place] = own
-        return if_else(self.is_at(place), fmax(own, self.signal), own)
+        self.lowered[place] = if_else(above > 0, above + _HEADROOM, 0)
+        return if_else(self.is_at(place), fmax(own, self.signal_at(place)), own)
+
+    def signal_at(self, place: int) -> Expr:
+        """Return the limiter's signal as it arrives at a place of the exciter's diagram."""
+        return self.signal - self.lowered[place]
 
 
 @dataclass(frozen=True)
@@ -71,9 +83,9 @@ class Regulated:
     v_0: Phasor = ZERO
     gate: Gate | None = None  # of a limiter of underexcitation
 
-    def lifted(self, own: Expr, place: int) -> Expr:
-        """An exciter's signal at a place of its diagram where a limiter may lift it."""
-        return own if self.gate is None else self.gate.lift(own, place)
+    def lifted(self, own: Expr, place: int, at_start: Scalar) -> Expr:
+        """An exciter's signal at a place of its diagram where a limiter may lift it; ``at_start``: in steady state."""
+        return own if self.gate is None else self.gate.lift(own, place, at_start)
 
     def terminal_voltage(self, E_fd: Expr) -> Expr:
         """|v_t| [pu, S_n] for an E_fd [pu]."""

@@ -82,7 +82,7 @@ def esst2a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         E_fd = clamp(x, 0, high)
         V_F, _ = rate_feedback(m, E_fd, E_0, 0.05, 1.0)
         measured = Measurement(m, seen)
-        error = seen.lifted(measured.error(V_A0 / p.K_A) - V_F, BEFORE)
+        error = seen.lifted(measured.error(V_A0 / p.K_A) - V_F, BEFORE, V_A0 / p.K_A)
         V_A = _amplifier(m, p, error, V_A0)
         rate = (V_A * source.available(seen.terminal(E_fd)) - p.K_E * E_fd) / p.T_E
         m.derivative(x, held_at_limits(x, rate, 0, high))

@@ -87,7 +87,7 @@ def dc1a(
         error = measured.error(V_R0 / K_A) - V_F
         if compensated:
             error = lead_lag_stage(m, error, V_R0 / K_A)
-        error = seen.lifted(error, BEFORE)
+        error = seen.lifted(error, BEFORE, V_R0 / K_A)
         v = seen.terminal_voltage(E_fd) if bus_fed else Expr(1)
         V_R = limited_low_pass(m, "amplifier", K_A * error, T_A, v * low, v * high, initial=V_R0)
         m.derivative(E_fd, (V_R - K_E * E_fd - curve.part(E_fd)) / T_E)
@@ -192,7 +192,7 @@ def ac1a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         measured = Measurement(m, seen)
         error = lead_lag_stage(m, measured.error(V_R0 / K_A) - V_F, V_R0 / K_A)
         V_A = limited_low_pass(m, "amplifier", K_A * error, T_A, A_low, A_high, initial=V_R0)
-        V_R = clamp(seen.lifted(V_A, BEHIND), R_low, R_high)
+        V_R = clamp(seen.lifted(V_A, BEHIND, V_R0), R_low, R_high)
         m.derivative(x, held_at_limits(x, (V_R - V_FE) / T_E, 0.0, _MOST))
         return measured.close(V_E * rectifier(K_C * seen.I_fd / fmax(V_E, _LEAST)))
 
@@ -224,7 +224,7 @@ def ac4a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         )
         measured = Measurement(m, seen)
         error = clamp(measured.error(V_I0), I_low, I_high)
-        compensated = seen.lifted(lead_lag_stage(m, error, V_I0, lead=1.0), BEFORE)
+        compensated = seen.lifted(lead_lag_stage(m, error, V_I0, lead=1.0), BEFORE, V_I0)
         ceiling = fmax(high - K_C * seen.I_fd, low)
         return measured.close(
             limited_low_pass(

@@ -111,11 +111,11 @@ def st1a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         m.require(
             if_else(logic_and(K_F > 0, T_A <= 0), -1, 1), "exciter.K_F > 0 needs exciter.T_A > 0"
         )
-        error = seen.lifted(clamp(measured.error(V_I0) - V_F, I_low, I_high), BEFORE)
+        error = seen.lifted(clamp(measured.error(V_I0) - V_F, I_low, I_high), BEFORE, V_I0)
         error = lead_lag_stage(m, error, V_I0)
         error = lead_lag_stage(m, error, V_I0, mark="1")
         V_A = close_limited_low_pass(m, amplifier, K_A * error, T_A, A_low, A_high)
-        V_X = seen.lifted(V_A - relieved(seen.I_fd), BEHIND)
+        V_X = seen.lifted(V_A - relieved(seen.I_fd), BEHIND, seen.start.E_fd)
         E_fd = between_ceilings(V_X, seen.terminal_voltage(between_ceilings(V_X, measured.nearly)))
         return measured.close(E_fd)
 

@@ -2,7 +2,8 @@
 
 A limiter's signal is added to the voltage reference, beside the stabiliser's. One that acts in the operating point has
 its signal in the reference of that point, so that the machine rests there. A limiter of underexcitation may lift the
-exciter's signal instead, at a gate where the exciter's diagram has one."""
+exciter's signal instead, at a gate where the exciter's diagram has one: there it is lowered to what the operating point
+needs, as no reference can make up for it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -23,6 +24,9 @@ _OUT_OF_REACH = 1e3
 """By which a lower limit is moved that nothing reaches [pu, S_n]."""
 
 _ONE = 0.5  # above which a condition of 0 or 1 holds
+
+_HEADROOM = 1e-3
+"""By which an operating point beyond a limiter's edge lies within the edge that is taken [pu, S_n]: enough for rest."""
 
 LEAST = 1e-6
 """Signal [pu, S_n] from which a limiter acts: far below what moves a voltage, far above rounding."""
@@ -77,6 +81,20 @@ def floors_behind(p: Given) -> Floors:
     return Floors(p.V_UIMIN, if_else(logic_and(alone, follows), 1, 0))
 
 
+def moved_edge(m: ModelBuilder, excess_0: Expr, integrates: Expr) -> Expr:
+    """Declare by how much a limiter's edge is moved [pu, S_n], so that it rests at an operating point beyond it.
+
+    ``excess_0``: how far the operating point is beyond the edge [pu, S_n]; ``integrates``: whether the limiter has an
+    integral, which would never come to rest there. One without an integral rests with its signal, and acts."""
+    return m.calculated(
+        "moved",
+        if_else(logic_and(integrates, excess_0 > 0), excess_0 + _HEADROOM, 0),
+        "pu",
+        "By how much its edge is moved, so that it rests at the operating point",
+        base="S_n",
+    )
+
+
 @dataclass(frozen=True)
 class Limiters:
     """The limiters of one machine; None where it has none of that kind."""
@@ -88,7 +106,7 @@ class Limiters:
         """Declare limiters and exciter and return its (E_fd, |v_t|) [pu]."""
         limited = {scope: _declare(m, seen, scope, x) for scope, x in self._by_scope()}
         uel = limited.get("uel")
-        gate = None if uel is None else Gate(uel.signal, _place(m))
+        gate = None if uel is None else Gate(uel.signal, uel.at_start, _place(m))
         signal, at_start = Expr(seen.v_s), Expr(0)
         for scope, each in limited.items():
             share = if_else(gate.place > 0, 0, 1) if scope == "uel" and gate is not None else 1
@@ -120,6 +138,9 @@ def _place(m: ModelBuilder) -> Expr:
         return m.parameter("gate", 0.0, "1", text, minimum=0, maximum=BEHIND)
 
 
+_LOWERED = "By how much its signal is lowered at a gate, so that it rests at the operating point"
+
+
 def _declare_outputs(m: ModelBuilder, scope: str, limited: Limited, gate: Gate | None) -> None:
     """Declare outputs of a limiter's signal and of whether it acts, and refuse a gate that the exciter lacks."""
     away = limited.signal - limited.at_rest
@@ -127,12 +148,16 @@ def _declare_outputs(m: ModelBuilder, scope: str, limited: Limited, gate: Gate |
     for place in () if gate is None else (BEFORE, BEHIND):
         assert gate is not None
         if place in gate.met:
-            acts = if_else(gate.is_at(place), if_else(limited.signal > gate.met[place], 1, 0), acts)
+            above = if_else(gate.signal_at(place) > gate.met[place], 1, 0)
+            acts = if_else(gate.is_at(place), above, acts)
         else:
             m.require(
                 if_else(gate.is_at(place), -1, 1),
                 f"uel.gate = {place}: this exciter has no gate there; take 0, or another exciter",
             )
     with m.scope(scope):
+        if gate is not None and gate.lowered:
+            lowered = sum((gate.is_at(x) * each for x, each in gate.lowered.items()), Expr(0))
+            m.calculated("lowered", lowered, "pu", _LOWERED, base="E_fd")
         m.output("signal", limited.signal, "pu", "Signal to the voltage regulator", base="S_n")
         m.output("acts", acts, "1", "1 while the limiter acts, else 0")

@@ -8,7 +8,8 @@
 
 F goes through the points (P0, Q0) to (P10, Q10), as far as P rises, and straight on beyond both ends; M = 0 has it
 even in P. K is K_fix, or with SW = 2 (v²/X_q + Q)/|v²/X_q + Q + jP| through 1/(1+sT_adj). The inputs K_UF and K_FB of
-the exciter's feedback are left out. UEL2 has the voltage for u, Q_ref at once, K = 1, and no limits between the stages.
+the exciter's feedback are left out. With K_UI > 0 an operating point below the polygon rests just above it: the edge
+is moved, and a warning says so. UEL2 has the voltage for u, Q_ref at once, K = 1, and no limits between the stages.
 Sources: IEEE 421.5-2016; the order of the fields and what the flags do as InterPSS
 has them (`Uel2cData`, `Uel2cUnderExcitationLimiter`), which it holds against PSS/E. UEL2's equations are those of
 OPAL-RT's ephasorsim-modelica-library at cba975b (`UEL2`), the order of its fields too, as PowerWorld's guide has it."""
@@ -18,7 +19,12 @@ from itertools import pairwise
 
 from fmus.synchronous_generator.data_lines import Given, declared, number, power, seconds
 from fmus.synchronous_generator.excitation.common import Regulated
-from fmus.synchronous_generator.limiters.common import Limited, floors_behind, rate_within_limits
+from fmus.synchronous_generator.limiters.common import (
+    Limited,
+    floors_behind,
+    moved_edge,
+    rate_within_limits,
+)
 from fmus.toolchain.blocks import BYPASS_TIME, clamp, lead_lag, low_pass_or_nothing
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
@@ -151,9 +157,11 @@ def _controlled(m: ModelBuilder, p: Given, excess: Expr, excess_0: Expr) -> tupl
     integrates = p.K_UI > 0
     x_0 = if_else(integrates, p.V_UIMIN, 0)
     x = m.state("integrator", x_0, "pu", "Integral of the excess", base="S_n")
-    within = rate_within_limits(x, p.K_UI * excess, p.V_UIMIN, p.V_UIMAX)
+    moved = moved_edge(m, excess_0, integrates)
+    within = rate_within_limits(x, p.K_UI * (excess - moved), p.V_UIMIN, p.V_UIMAX)
     m.derivative(x, if_else(integrates, within, -x / BYPASS_TIME))
-    now, start = (p.K_UL * e + integral for e, integral in ((excess, x), (excess_0, x_0)))
+    both = ((excess, x), (excess_0, x_0))
+    now, start = (p.K_UL * (e - moved) + integral for e, integral in both)
     low = floors_behind(p).of(p.V_UIMIN)
     return clamp(now, low, p.V_UIMAX), clamp(start, low, p.V_UIMAX)
 

@@ -11,13 +11,20 @@ UEL1 (IEEE 421.5), a circle about Q = K_UC·v² with the radius K_UR·v²:
     e → K_UL + K_UI/s, the integral within V_UIMIN and V_UIMAX and the sum too → (1+sT_U1)/(1+sT_U2)
     → (1+sT_U3)/(1+sT_U4) = V_UEL, within V_ULMIN and V_ULMAX; at rest all is at the lower limits
 
+With K_UI > 0 an operating point beyond the circle rests just within it: the edge is moved, and a warning says so.
+
 V_UEL is added to the voltage reference, or lifts the exciter's signal at a gate. UEL1's input of the exciter's rate
 feedback, K_UF, is left out. Sources: OpenIPSL's MNLEX2 of October 2024, after PSS/E's manual (GridDyn has the same);
 IEEE 421.5 and Dynawo's Uel1 at 289313a, whose integral stops while the sum is at a limit."""
 
 from fmus.synchronous_generator.data_lines import declared, number, power, seconds
 from fmus.synchronous_generator.excitation.common import Regulated
-from fmus.synchronous_generator.limiters.common import Limited, floors_behind, rate_within_limits
+from fmus.synchronous_generator.limiters.common import (
+    Limited,
+    floors_behind,
+    moved_edge,
+    rate_within_limits,
+)
 from fmus.toolchain.blocks import BYPASS_TIME, clamp, lead_lag
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
@@ -84,7 +91,9 @@ def uel1(m: ModelBuilder, seen: Regulated) -> Limited:
     integrates = p.K_UI > 0
     x_0 = if_else(integrates, p.V_UIMIN, 0)
     x = m.state("integrator", x_0, "pu", "Integral of the excess", base="S_n")
-    e = excess(seen.terminal(seen.I_fd), seen.i)
+    excess_0 = excess(seen.v_0, seen.start.i)
+    moved = moved_edge(m, excess_0, integrates)
+    e = excess(seen.terminal(seen.I_fd), seen.i) - moved
     within = rate_within_limits(x, p.K_UI * e, p.V_UIMIN, p.V_UIMAX)
     m.derivative(x, if_else(integrates, within, -x / BYPASS_TIME))
 
@@ -93,7 +102,7 @@ def uel1(m: ModelBuilder, seen: Regulated) -> Limited:
     def controlled(excess: Expr, integral: Expr) -> Expr:
         return clamp(p.K_UL * excess + integral, floors.of(p.V_UIMIN), p.V_UIMAX)
 
-    first = controlled(excess(seen.v_0, seen.start.i), x_0)
+    first = controlled(excess_0 - moved, x_0)
     u = lead_lag(m, "lead_lag_1", controlled(e, x), p.T_U1, p.T_U2, first)
     u = lead_lag(m, "lead_lag_2", u, p.T_U3, p.T_U4, first)
     lowest = floors.of(p.V_ULMIN)

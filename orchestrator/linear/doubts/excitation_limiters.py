@@ -9,6 +9,12 @@ from orchestrator.systems.coupling.master import Master
 _KINDS = {"oel": "overexcitation", "uel": "underexcitation"}
 _ACTS = "acts"  # output of a limiter: 1 while it acts
 _SIGNAL = "signal"  # what it adds to the voltage reference [pu]
+_LATER = {
+    "moved": "its edge is taken {} pu farther out",
+    "lowered": "its signal is taken {} pu lower",
+}
+"""Variables by how much a limiter acts later than its data say, in words; 0 where the start is within its edge."""
+
 _YES = 0.5  # above it an output says yes
 
 
@@ -44,7 +50,9 @@ def _of_machine(master: Master, name: str) -> Iterator[str]:
             continue
         limits = [one for one in _LIMITS if f"{scope}.{one.taken}" in variables]
         names = [f"{scope}.{name}" for one in limits for name in (one.name, one.taken)]
-        found = component.values([acts, signal, *names])
+        later = {f"{scope}.{one}": words for one, words in _LATER.items()}
+        later = {one: words for one, words in later.items() if one in variables}
+        found = component.values([acts, signal, *names, *later])
         without = f"{Option.SET} {name}.{scope}=none"
         remedy = f"correct its data, or the operating point; without it: {without}"
         if found[acts] > _YES:
@@ -54,6 +62,12 @@ def _of_machine(master: Master, name: str) -> Iterator[str]:
                 f"acting; {remedy}"
             )
             continue
+        for variable in (one for one in later if found[one] > 0):
+            words = later[variable].format(f"{found[variable]:.4g}")
+            yield (
+                f"{name}: the operating point is beyond the edge of its limiter of {kind}: it is let rest, and {words} "
+                f"({variable}); {remedy}"
+            )
         for one in limits:
             limit, taken = f"{scope}.{one.name}", f"{scope}.{one.taken}"
             if found[taken] > found[limit]:

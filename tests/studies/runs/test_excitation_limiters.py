@@ -86,3 +86,16 @@ def test_modes_tell_of_an_operating_point_beyond_the_limits_of_oel2c():
     assert free.electromechanical is not None
     wanted = free.electromechanical.eigenvalue
     assert beyond.electromechanical.eigenvalue == pytest.approx(wanted, rel=1e-6)
+
+
+def test_modes_tell_of_an_operating_point_beyond_a_limiter_that_integrates():
+    """It would never come to rest there; modes are those without it."""
+    uel = {"sg1.uel": "uel1", "sg1.uel.K_UR": 0.5, "sg1.uel.K_UI": 1.0, "sg1.uel.V_UIMIN": 0.0}
+    beyond, free = (compute_modes(prepared(x)) for x in (uel, {}))
+    (text,) = about_limiters(beyond.warnings)
+    assert "beyond the edge of its limiter of underexcitation: it is let rest, and its edge" in text
+    assert "pu farther out (uel.moved)" in text
+    assert beyond.electromechanical is not None
+    assert free.electromechanical is not None
+    wanted = free.electromechanical.eigenvalue
+    assert beyond.electromechanical.eigenvalue == pytest.approx(wanted, rel=1e-6)
