@@ -224,15 +224,17 @@ def _pattern(
 def _groups(pattern: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
     """Columns without a common row, greedily, those with most rows first."""
     order = np.argsort(-pattern.sum(axis=0), kind="stable")
+    columns = np.ascontiguousarray(pattern.T)
+    taken = np.zeros_like(
+        columns
+    )  # which rows each group has; there are no more groups than columns
     groups: list[list[int]] = []
-    taken: list[NDArray[np.bool_]] = []
     for k in order.tolist():
-        for members, reached in zip(groups, taken, strict=True):
-            if not (reached & pattern[:, k]).any():
-                members.append(k)
-                np.logical_or(reached, pattern[:, k], out=reached)
-                break
-        else:
-            groups.append([k])
-            taken.append(pattern[:, k].copy())
+        rows = np.flatnonzero(columns[k])
+        free = np.flatnonzero(~taken[: len(groups), rows].any(axis=1))
+        place = int(free[0]) if len(free) else len(groups)
+        if place == len(groups):
+            groups.append([])
+        groups[place].append(k)
+        taken[place, rows] = True
     return [np.array(group, dtype=np.int64) for group in groups]

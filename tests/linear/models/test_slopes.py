@@ -55,3 +55,20 @@ def test_slopes_need_states_that_can_be_set_and_a_derivative_of_each(settable, r
     )
     exchange = SimpleNamespace(component=SimpleNamespace(description=description))
     assert slopes.gives_slopes(exchange) is gives
+
+
+@pytest.mark.parametrize("share", [0.0, 0.05, 0.2])
+def test_variables_without_a_common_answer_are_moved_together(share):
+    """Each is in the first group that has none of its answers, those with most answers first."""
+    pattern = np.random.default_rng(5).random((60, 50)) < share
+    pattern[:40, 3] = True
+    groups = slopes._groups(pattern)
+    assert sorted(np.concatenate(groups).tolist()) == list(range(50))
+    order = np.argsort(-pattern.sum(axis=0), kind="stable").tolist()
+    for place, group in enumerate(groups):
+        assert pattern[:, group].sum(axis=1).max() <= 1
+        for k in group.tolist():
+            earlier = order[: order.index(k)]
+            for other in groups[:place]:
+                there = [one for one in other.tolist() if one in earlier]
+                assert (pattern[:, there].any(axis=1) & pattern[:, k]).any()
