@@ -2,7 +2,8 @@
 
 import os
 import zipfile
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments, parts_of
@@ -29,6 +30,26 @@ def catalogue_model(name: str, parts: Mapping[str, str] | None = None) -> Model:
         If there is none of that name, it needs a network, has no such part, or its equations break a rule of the model
         builder.
     """
+    chosen = known_parts(name, parts)
+    with building(name):
+        return build_model(name, **chosen)
+
+
+def known_parts(name: str, parts: Mapping[str, str] | None = None) -> dict[str, str]:
+    """The parts that are chosen of a model, checked by the catalogue's notes: the model is not built for it.
+
+    Parameters
+    ----------
+    name
+        Of the model.
+    parts
+        As in `catalogue_model`.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name, it needs a network, or has no such part.
+    """
     if name not in model_names():
         raise InputError(f"there is no model {name!r}; there are: {', '.join(model_names())}")
     if needs_arguments(name):
@@ -44,8 +65,25 @@ def catalogue_model(name: str, parts: Mapping[str, str] | None = None) -> Model:
     if unknown:
         has = f"it is made of {', '.join(known)}" if known else "'synchronous_generator' has some"
         raise InputError(f"model {name!r} has no part {unknown[0]!r} to choose; {has}")
+    return chosen
+
+
+@contextmanager
+def building(name: str) -> Iterator[None]:
+    """Say with an `InputError` of which model the equations break a rule of the model builder, inside ``with``.
+
+    Parameters
+    ----------
+    name
+        Of the model that is built inside.
+
+    Raises
+    ------
+    InputError
+        If the model builder refuses it.
+    """
     try:
-        return build_model(name, **chosen)
+        yield
     except ValueError as error:
         raise InputError(f"model {name!r} cannot be built: {error}") from error
 

@@ -237,10 +237,11 @@ def _declared(description: FmuDescription, name: str, otherwise: float) -> float
 def _of_ours(name: str) -> FmuDescription:
     """A model of ours, without Python in it where this machine can compile."""
     from orchestrator.cases.scenario.catalogue_fmus import quickest_fmu  # noqa: PLC0415 - likewise
-    from orchestrator.face.api.models import catalogue_model  # noqa: PLC0415 - builds models
+    from orchestrator.face.api.models import building, known_parts  # noqa: PLC0415 - builds models
 
-    catalogue_model(name)  # refuses what is none, or needs a network
-    return quickest_fmu(name)
+    known_parts(name)  # refuses what is none, or needs a network
+    with building(name):
+        return quickest_fmu(name)
 
 
 def _of_case(

@@ -7,6 +7,8 @@ import pytest
 import xarray as xr
 
 import orchestrator as gfor_in_python
+from orchestrator.core.errors import InputError
+from orchestrator.face.api import models
 from orchestrator.output.results.comtrade.writing import write_comtrade
 from orchestrator.studies.validation.limits import EXAMPLE
 from tests.studies.validation.recordings import run, table, waves, with_noise, written
@@ -182,6 +184,20 @@ def test_a_file_of_limits_says_what_is_wrong_with_it(gfor, recording, tmp_path):
     code, _, err = gfor("validate", "gfor", str(recording), "--limits", str(limits))
     assert code == 2
     assert "later" in err
+
+
+def test_a_model_of_ours_is_known_by_the_catalogue_without_being_built(recording, monkeypatch):
+    gfor_in_python.validate("gfor", recording, values=ON)  # its FMU is built now
+
+    def refuse(name, **parts):
+        pytest.fail(f"{name} is built, and only its name was asked about")
+
+    monkeypatch.setattr(models, "build_model", refuse)
+    assert gfor_in_python.validate("gfor", recording, values=ON).verdict is None
+    with pytest.raises(InputError, match="there is no model 'gfr'"):
+        gfor_in_python.validate("gfr", recording)
+    with pytest.raises(InputError, match=r"built from the \[network\] table"):
+        gfor_in_python.validate("grid", recording)
 
 
 def test_windows_are_as_the_user_says(recording):
