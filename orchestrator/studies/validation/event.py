@@ -25,6 +25,7 @@ from orchestrator.studies.validation.figures import (
 )
 from orchestrator.studies.validation.filled import Mask, runs_of
 from orchestrator.studies.validation.frames import frames_of, grid_of_frames
+from orchestrator.studies.validation.held_by_samples import fastest_hertz, is_too_fast
 from orchestrator.studies.validation.other_event import ask_of_other_event
 from orchestrator.studies.validation.out_of_step import step_loss
 from orchestrator.studies.validation.parameters import NEVER
@@ -232,13 +233,11 @@ def _slow_samples(comparison: EventComparison) -> list[Question]:
         and info.unit == "s"
         and info.name not in NEVER
     }
-    # time constant [s] whose corner, 1/(2πτ), is at the fastest frequency that the samples hold
-    slowest = interval / np.pi
-    fast = sorted(name for name, value in times.items() if 0 < value < slowest)
+    fast = sorted(name for name, value in times.items() if is_too_fast(value, interval))
     such = ", ".join(f"{name} = {times[name]:g} s" for name in fast[:_SUCH])
     figures = {
         "interval": interval,
-        "fastest": 0.5 / interval,
+        "fastest": fastest_hertz(interval),
         "such": f" ({such})" if such else "",
     }
     return [Question(QuestionKind.SLOW_SAMPLES, figures)]

@@ -15,6 +15,7 @@ from orchestrator.core.arrays import Matrix, Numbers
 from orchestrator.core.late import optimize, stats
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import RecordedEvent
+from orchestrator.studies.validation.held_by_samples import is_too_fast
 from orchestrator.studies.validation.parameters import Adjustable, Wanted
 from orchestrator.studies.validation.residuals import (
     Report,
@@ -417,7 +418,7 @@ def identifiable(
     interval = min(one.event.recording.interval for one in residuals.stretches)
     told = []
     for one in numbers:
-        if one.unit == "s" and 0 < one.start < interval:
+        if one.unit == "s" and is_too_fast(one.start, interval):
             untold[one.name] = (Untold.TOO_FAST, ())
         else:
             told.append(one)
