@@ -375,7 +375,9 @@ def _stage_end(
         if cost < best.cost:
             best.cost, best.rms, best.values = cost, _rms(found), given
             said = ", ".join(f"{one.name} = {given[one.name]:.4g}" for one in told)
-            residuals.report(f"fit: rms {_rms(found):.4g} scatters with {said}")
+            residuals.report(
+                f"fit: rms error {_rms(found):.4g} times the recording's noise with {said}"
+            )
         return mean(found)
 
     def slopes(x: Numbers) -> Matrix:

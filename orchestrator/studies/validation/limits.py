@@ -48,7 +48,7 @@ class LimitTables(Table):
 
 
 class LimitVerdict(StrEnum):
-    """``open``: a question stands, or the recording's own scatter allows no verdict."""
+    """``open``: a question stands, or the recording's own noise allows no verdict."""
 
     MET = "met"
     NOT_MET = "not met"

@@ -185,7 +185,7 @@ def _no_noise(x: Figures) -> str:
 
 def _noise(x: Figures) -> str:
     return (
-        f"the recording's own scatter is {x['scatter']:.2g} pu, more than the largest error allowed: it allows no "
+        f"the recording's own noise is {x['scatter']:.2g} pu, more than the largest error allowed: it allows no "
         "verdict"
     )
 
@@ -231,7 +231,7 @@ def untold_words(one: FittedParameter) -> str:
         case Untold.NO_EFFECT:
             return "no: it moves nothing that the recordings hold"
         case Untold.TOO_FAST:
-            return "no: it acts faster than the samples"
+            return "no: it acts at frequencies above half the samples' rate"
         case Untold.AT_BOUND:
             return "no: it ends at its bound"
         case Untold.NO_BETTER:
@@ -297,7 +297,7 @@ def swing_cell(comparison: EventComparison) -> str:
 
 
 _WHY_OPEN = {
-    OpenCause.SCATTER: "the recording's own scatter is as large as the limit",
+    OpenCause.SCATTER: "the recording's own noise is as large as the limit",
     OpenCause.SAMPLES: "between two samples it is not known when the voltage jumped",
     OpenCause.STEP: "the device sees a jump of the voltage only at the begin of its step",
     OpenCause.FIXED_STEP: "the device sees a jump of the voltage only at the begin of its step, and refuses a "
@@ -415,26 +415,30 @@ def _said_of_causes(explanations: Sequence[Explanation]) -> str:
     if not best.explains:
         return (
             f"No cause by itself explains most of the error; the nearest is {_cause(best)}, with {best.share:.0%} of "
-            "the squared error beyond the scatter."
+            "the squared error beyond the recording's own noise."
         )
     are, they = ("causes are", "they explain") if best.beside_now else ("cause is", "it explains")
     said = f"The likeliest {are} {_cause(best)}: "
-    said += f"{they} {best.share:.0%} of the squared error beyond the scatter."
+    said += f"{they} {best.share:.0%} of the squared error beyond the recording's own noise."
     alike = [one for one in explanations[1:] if one.name != best.name and one.explains]
     if best.leaves_much:
-        times = f", {best.left / best.noise:.0f} times the scatter" if best.noise > 0 else ""
+        times = f", {_times_noise(best)}" if best.noise > 0 else ""
         said += (
             f" {best.left:.2g} pu (rms) are left{times}: something else may be off as well, and its part is in this "
             "value; " + Option.FIT + " finds several values together." + _second_cause(best)
         )
     elif best.leaves_some:
         said += (
-            f" {best.left:.2g} pu (rms) are left, {best.left / best.noise:.0f} times the scatter, as samples and steps "
-            "make as well." + _second_cause(best)
+            f" {best.left:.2g} pu (rms) are left, {_times_noise(best)}, as samples and steps make as well."
+            + _second_cause(best)
         )
     if alike:
         said += f" The recordings tell it hardly apart from {'; '.join(map(_cause, alike))}."
     return said
+
+
+def _times_noise(one: Explanation) -> str:
+    return f"{one.left / one.noise:.0f} times the recording's own noise"
 
 
 def _second_cause(one: Explanation) -> str:
@@ -488,7 +492,7 @@ def fit_sentence(fit: Fit, kept_back: Sequence[str]) -> str:
     if not fit.finished:
         said += ", interrupted: the best values so far, without intervals"
     if not fit.reached:
-        said += f"; the error that is left is {fit.error_after:.3g} times the scatter"
+        said += f"; the error that is left is {fit.error_after:.3g} times the recording's own noise"
     if not fit.reached and fit.finished:
         said += (
             ": another parameter is wrong, or the fit ended at the wrong values, or the samples hold too little of "

@@ -271,7 +271,7 @@ def test_a_rest_above_the_scatter_is_told_with_what_looks_for_a_second_cause():
     """A gain of 140 and a droop of Q of 0.05: the first leaves 0.0009 pu, and the second is seen beside it alone."""
     gain = Explanation(CauseKind.VALUE, "pod_p.K", "pu", 200.0, 139.6, 0.02, 0.0009, noise=0.0002)
     said = explanation_sentence([gain])
-    assert "0.0009 pu (rms) are left, 4 times the scatter" in said
+    assert "0.0009 pu (rms) are left, 4 times the recording's own noise" in said
     assert said.endswith("A second cause is looked for with --set pod_p.K=139.6 --explain.")
     much = explanation_sentence([replace(gain, left=0.004)])
     assert "something else may be off" in much
@@ -288,7 +288,9 @@ def test_a_cause_beside_another_is_not_said_to_be_all():
     assert not alone.leaves_much
     assert beside.leaves_much
     assert "something else may be off" not in explanation_sentence([alone])
-    assert "0.0019 pu (rms) are left, 3 times the scatter" in explanation_sentence([beside])
+    assert "0.0019 pu (rms) are left, 3 times the recording's own noise" in explanation_sentence(
+        [beside]
+    )
     assert alone.same_as(replace(alone, left=0.001))
     assert alone.same_as(beside)
     assert not alone.same_as(replace(alone, name="pod_p.T_W"))
