@@ -20,7 +20,9 @@ from orchestrator.studies.validation.causes import CauseKind, Explanation, cap_o
 from orchestrator.studies.validation.event import RecordedEvent
 
 _LIMITS_ARE = (0.9, 2.0)  # times the plant's largest current, as numbers in pu that may be limits
-_LEVELS = (0.95, 0.9, 0.85, 0.8, 0.75, 0.7)  # times that current, at which they are tried
+_LEVELS = (1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7)
+"""Times that current, at which they are tried: the current may be nearly all along the limited axis."""
+
 _CLEARLY = 1.3  # times less that two numbers leave, to be named in place of one
 _MOST_LIMITS = 12  # values that are tried as a limit, with the kinds that would use them
 

@@ -192,7 +192,10 @@ def _explained(result: ValidationResult) -> str:
 
 def _causes_said(result: ValidationResult) -> str:
     return explanation_sentence(
-        result.explanations, finished=not result.interrupted, in_step=result.explained_in_step
+        result.explanations,
+        finished=not result.interrupted,
+        in_step=result.explained_in_step,
+        plain=result.plain_part,
     )
 
 

@@ -36,6 +36,7 @@ from orchestrator.studies.validation.limits import (
     verdict_of,
 )
 from orchestrator.studies.validation.parameters import Wanted, wanted_parameters
+from orchestrator.studies.validation.plain_part import PlainPart, plain_part
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.record import PortBases, read_recording
 from orchestrator.studies.validation.trials import RefusedTrial
@@ -103,6 +104,7 @@ class ValidationResult:
     confirmations: Sequence[FitCheck] = field(default=())
     explanations: Sequence[Explanation] = field(default=())
     explained_in_step: bool = False  # whether the model was held in step for them
+    plain_part: PlainPart | None = None  # up to where the first of them holds without that
     others: Sequence[EventComparison] = field(default=())  # of the other model, in the same order
     interrupted: bool = False  # before all that was asked for was done
 
@@ -190,7 +192,23 @@ def _validate(request: ValidationRequest, report: Report) -> ValidationResult:
             explained_in_step=search.held,
             interrupted=not search.finished,
         )
+        result = _with_plain_part(result, report)
     return _with_fit(result, report) if request.fit and not result.interrupted else result
+
+
+def _with_plain_part(result: ValidationResult, report: Report) -> ValidationResult:
+    """The result with the part in which the first cause holds in plain play-back, where it was found in step.
+
+    If that is interrupted, the causes stay."""
+    causes, events = result.explanations, [one.event for one in result.comparisons]
+    if not result.explained_in_step or result.interrupted or not causes or not causes[0].explains:
+        return result
+    try:
+        return replace(
+            result, plain_part=plain_part(result.request.device, events, causes[0], report)
+        )
+    except KeyboardInterrupt:
+        return replace(result, interrupted=True)
 
 
 def _search_causes(

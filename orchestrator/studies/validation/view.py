@@ -128,9 +128,11 @@ class Validation:
     def _explained_json(self) -> dict[str, Any]:
         if not self.result.request.explain:
             return {}
+        part = self.result.plain_part
         return {
             "explanations": [one.as_json() for one in self.result.explanations],
             "explained_in_step": self.result.explained_in_step,
+            "explained_plainly": None if part is None else part.as_json(),
         }
 
     def _fit_json(self) -> dict[str, Any]:
@@ -267,6 +269,7 @@ def parts(found: Validation) -> Iterator[RenderableType]:
             result.explanations,
             finished=not result.interrupted,
             in_step=result.explained_in_step,
+            plain=result.plain_part,
         )
         yield escape(said)
     if result.explanations:

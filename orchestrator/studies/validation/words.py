@@ -13,6 +13,7 @@ from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import EventComparison, JumpDoubt
 from orchestrator.studies.validation.fit import Fit, FittedParameter, Untold
 from orchestrator.studies.validation.limits import Criterion, LimitVerdict, OpenCause
+from orchestrator.studies.validation.plain_part import PlainPart
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.recorder_words import (
     RECORDER_SENTENCES,
@@ -397,18 +398,55 @@ def _likely(one: Explanation) -> str:
 
 
 def explanation_sentence(
-    explanations: Sequence[Explanation], *, finished: bool = True, in_step: bool = False
+    explanations: Sequence[Explanation],
+    *,
+    finished: bool = True,
+    in_step: bool = False,
+    plain: PlainPart | None = None,
 ) -> str:
     """Name the cause that explains the most, and those that explain nearly as much.
 
-    ``finished``: whether all causes were tried; ``in_step``: whether the model was held in step for them."""
-    said = _said_of_causes(explanations)
+    ``finished``: whether all causes were tried; ``in_step``: whether the model was held in step for them; ``plain``: up
+    to where the first one holds without that."""
+    said = _said_of_causes(explanations, in_step=in_step)
     if in_step:
         said += f" {_HELD}"
+    if plain is not None:
+        said += f" {_plainly(plain)}"
     return said if finished else f"Interrupted before all causes were tried. {said}"
 
 
-def _said_of_causes(explanations: Sequence[Explanation]) -> str:
+def _plainly(part: PlainPart) -> str:
+    """Say up to where a cause holds in plain play-back, with which value, and what confirms it."""
+    stop = Option.STOP + f" {part.until:.4g}"
+    given = " ".join(f"{Option.SET} {name}={value_text(x)}" for name, x in part.values.items())
+    if not part.shows:
+        return (
+            f"Without that it leaves the plant at once, at {part.until:.4g} s of {part.recording}: no part of the "
+            "recording confirms the cause. Give a recording of a smaller event as well."
+        )
+    leaves = f"{part.left:.2g} of {part.error:.2g} pu (rms)"
+    if not part.confirms:
+        return (
+            f"Without that it leaves the plant at {part.until:.4g} s of {part.recording}, and up to there {leaves} "
+            f"are left: the recording does not confirm the cause. {Option.EXPLAIN} {stop} looks at that part alone."
+        )
+    values = " and ".join(f"{name} = {value_text(x)}" for name, x in part.values.items())
+    if part.to_end:
+        return (
+            f"Without that the model stays beside the plant to the end of {part.recording} with {values}, which leaves "
+            f"{leaves}: confirm it with {given}, and "
+            + Option.FIT
+            + f" {', '.join(part.values)} gives its interval."
+        )
+    return (
+        f"Without that the model stays beside the plant up to {part.until:.4g} s of {part.recording} with {values}, "
+        f"which leaves {leaves} up to there: confirm it with {given} {stop}. An interval is not given: what the "
+        "voltage does between the samples moves the value by more than their noise."
+    )
+
+
+def _said_of_causes(explanations: Sequence[Explanation], *, in_step: bool) -> str:
     if not explanations:
         return "No cause that was tried leaves less of the error."
     best = explanations[0]
@@ -421,20 +459,29 @@ def _said_of_causes(explanations: Sequence[Explanation]) -> str:
     said = f"The likeliest {are} {_cause(best)}: "
     said += f"{they} {best.share:.0%} of the squared error beyond the recording's own noise."
     alike = [one for one in explanations[1:] if one.name != best.name and one.explains]
-    if best.leaves_much:
-        times = f", {_times_noise(best)}" if best.noise > 0 else ""
-        said += (
-            f" {best.left:.2g} pu (rms) are left{times}: something else may be off as well, and its part is in this "
-            "value; " + Option.FIT + " finds several values together." + _second_cause(best)
-        )
-    elif best.leaves_some:
-        said += (
-            f" {best.left:.2g} pu (rms) are left, {_times_noise(best)}, as samples and steps make as well."
-            + _second_cause(best)
-        )
+    if not in_step:  # what gives way leaves something of the right value as well
+        said += _left_over(best)
     if alike:
         said += f" The recordings tell it hardly apart from {'; '.join(map(_cause, alike))}."
     return said
+
+
+def _left_over(best: Explanation) -> str:
+    """Say what the likeliest cause leaves, where that stands above the recording's own noise."""
+    left = f" {best.left:.2g} pu (rms) are left"
+    if best.leaves_much:
+        times = f", {_times_noise(best)}" if best.noise > 0 else ""
+        return (
+            f"{left}{times}: something else may be off as well, and its part is in this value; "
+            + Option.FIT
+            + " finds several values together."
+            + _second_cause(best)
+        )
+    if best.leaves_some:
+        return f"{left}, {_times_noise(best)}, as samples and steps make as well." + _second_cause(
+            best
+        )
+    return ""
 
 
 def _times_noise(one: Explanation) -> str:
