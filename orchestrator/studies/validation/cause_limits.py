@@ -17,7 +17,6 @@ from orchestrator.studies.validation.cause_bench import (
 )
 from orchestrator.studies.validation.cause_numbers import follow, promises_of
 from orchestrator.studies.validation.causes import CauseKind, Explanation, cap_of_current, capped
-from orchestrator.studies.validation.event import RecordedEvent
 
 _LIMITS_ARE = (0.9, 2.0)  # times the plant's largest current, as numbers in pu that may be limits
 _LEVELS = (1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7)
@@ -55,13 +54,18 @@ def levels_of_limits(bench: CauseBench, rough: CauseBench) -> Iterator[Explanati
     """Numbers that may be limits of the current, at levels below the plant's largest: one of an axis acts below it.
 
     A model that is held in step far from the plant shows no level by itself, as `cap_of_current` looks for."""
-    seen = max(_largest_current(one) for one in bench.events)
-    likely = [info for info in bench.parameters("Real") if _may_limit(bench, info, seen)]
+    seen, likely = largest_current(bench), likely_limits(bench)
     best = list(_best_level(bench, rough, [(info,) for info in likely], seen))
     yield from best
     for one in _best_level(bench, rough, _axes(bench, likely), seen):
         if not best or one.left * _CLEARLY < best[0].left:  # a number by itself is simpler
             yield one
+
+
+def likely_limits(bench: CauseBench) -> list[VariableInfo]:
+    """Numbers near the plant's largest current, which may be limits of it or of an axis."""
+    seen = largest_current(bench)
+    return [info for info in bench.parameters("Real") if _may_limit(bench, info, seen)]
 
 
 def _may_limit(bench: CauseBench, info: VariableInfo, seen: float) -> bool:
@@ -96,10 +100,14 @@ def _best_level(
         yield from _limiter(bench, info, values)
 
 
-def _largest_current(event: RecordedEvent) -> float:
+def largest_current(bench: CauseBench) -> float:
     """Largest of the measured currents [pu of the rating]."""
-    good = event.recording.good
-    return float(np.abs(event.recording.power[good] / event.recording.voltage[good]).max())
+    found = []
+    for event in bench.events:
+        good = event.recording.good
+        current = event.recording.power[good] / event.recording.voltage[good]
+        found.append(float(np.abs(current).max()))
+    return max(found)
 
 
 def _limiters(bench: CauseBench, limit: float) -> Iterator[tuple[VariableInfo, Values]]:

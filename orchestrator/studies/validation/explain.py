@@ -26,7 +26,7 @@ from orchestrator.studies.validation.cause_numbers import (
     numbers_by_slope,
     promises_of,
 )
-from orchestrator.studies.validation.cause_pairs import pair_of_numbers
+from orchestrator.studies.validation.cause_pairs import pair_of_limits, pair_of_numbers
 from orchestrator.studies.validation.causes import (
     CauseKind,
     CauseSearch,
@@ -136,7 +136,7 @@ def _causes(
 
     Numbers are tried far from where they are, limits at levels, and two numbers at once, only if what was found leaves
     more than the scatter. A run that is held in step takes three times as long: there the former is done if nothing
-    explains, and the last not at all."""
+    explains, and the last for limits alone."""
     looked_at = _looked_at(device, events)
     bench = CauseBench(device, looked_at, report)
     rough = bench if device.rough is device else CauseBench(device.rough, looked_at, report)
@@ -162,6 +162,8 @@ def _causes(
     enough = explained if device.gives_way else told
     if far and not enough and bench.misses:
         yield from seen(numbers_by_factors(bench, rough, promises))
+    if not told and best is not None:
+        yield from seen(pair_of_limits(bench, rough, best))
     if not told and best is not None and not device.gives_way:
         yield from pair_of_numbers(bench, rough, best)
 
