@@ -196,6 +196,7 @@ def _causes_said(result: ValidationResult) -> str:
         finished=not result.interrupted,
         in_step=result.explained_in_step,
         plain=result.plain_part,
+        unreached=result.unreached,
     )
 
 

@@ -40,6 +40,7 @@ from orchestrator.studies.validation.plain_part import PlainPart, plain_part
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.record import PortBases, read_recording
 from orchestrator.studies.validation.trials import RefusedTrial
+from orchestrator.studies.validation.unreached import unreached_limits
 from orchestrator.studies.validation.windows import given_windows
 from orchestrator.studies.validation.words import sentence
 
@@ -104,6 +105,7 @@ class ValidationResult:
     confirmations: Sequence[FitCheck] = field(default=())
     explanations: Sequence[Explanation] = field(default=())
     explained_in_step: bool = False  # whether the model was held in step for them
+    unreached: Sequence[str] = field(default=())  # limits beside it of which nothing is seen
     plain_part: PlainPart | None = None  # up to where the first of them holds without that
     others: Sequence[EventComparison] = field(default=())  # of the other model, in the same order
     interrupted: bool = False  # before all that was asked for was done
@@ -192,21 +194,26 @@ def _validate(request: ValidationRequest, report: Report) -> ValidationResult:
             explained_in_step=search.held,
             interrupted=not search.finished,
         )
-        result = _with_plain_part(result, report)
+        result = _with_confirmation(result, report)
     return _with_fit(result, report) if request.fit and not result.interrupted else result
 
 
-def _with_plain_part(result: ValidationResult, report: Report) -> ValidationResult:
-    """The result with the part in which the first cause holds in plain play-back, where it was found in step.
+def _with_confirmation(result: ValidationResult, report: Report) -> ValidationResult:
+    """The result with what else is known of its first cause: limits beside it that are not reached, and, where it was
+    found in step, the part in which it holds in plain play-back.
 
     If that is interrupted, the causes stay."""
     causes, events = result.explanations, [one.event for one in result.comparisons]
-    if not result.explained_in_step or result.interrupted or not causes or not causes[0].explains:
+    if result.interrupted or not causes or not causes[0].explains:
         return result
+    device = result.request.device
+    held = device.in_step if result.explained_in_step else device
     try:
-        return replace(
-            result, plain_part=plain_part(result.request.device, events, causes[0], report)
-        )
+        unreached = unreached_limits(held, events, causes[0], report)
+        result = replace(result, unreached=unreached)
+        if not result.explained_in_step:
+            return result
+        return replace(result, plain_part=plain_part(device, events, causes[0], report))
     except KeyboardInterrupt:
         return replace(result, interrupted=True)
 

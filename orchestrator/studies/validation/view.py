@@ -132,6 +132,7 @@ class Validation:
         return {
             "explanations": [one.as_json() for one in self.result.explanations],
             "explained_in_step": self.result.explained_in_step,
+            "unreached_limits": list(self.result.unreached),
             "explained_plainly": None if part is None else part.as_json(),
         }
 
@@ -270,6 +271,7 @@ def parts(found: Validation) -> Iterator[RenderableType]:
             finished=not result.interrupted,
             in_step=result.explained_in_step,
             plain=result.plain_part,
+            unreached=result.unreached,
         )
         yield escape(said)
     if result.explanations:

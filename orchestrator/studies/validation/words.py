@@ -403,16 +403,22 @@ def explanation_sentence(
     finished: bool = True,
     in_step: bool = False,
     plain: PlainPart | None = None,
+    unreached: Sequence[str] = (),
 ) -> str:
     """Name the cause that explains the most, and those that explain nearly as much.
 
     ``finished``: whether all causes were tried; ``in_step``: whether the model was held in step for them; ``plain``: up
-    to where the first one holds without that."""
+    to where the first one holds without that; ``unreached``: limits beside it that the model does not reach with it."""
     said = _said_of_causes(explanations, in_step=in_step)
     if in_step:
         said += f" {_HELD}"
     if plain is not None:
         said += f" {_plainly(plain)}"
+    if unreached:
+        said += (
+            f" With it the model does not come near {' and '.join(unreached)}: the recording does not tell whether "
+            "that is right."
+        )
     return said if finished else f"Interrupted before all causes were tried. {said}"
 
 

@@ -8,6 +8,7 @@ import orchestrator as gfor_in_python
 from orchestrator.studies.validation.cause_bench import CauseBench
 from orchestrator.studies.validation.cause_pairs import pair_of_limits
 from orchestrator.studies.validation.causes import CauseKind, Explanation
+from orchestrator.studies.validation.unreached import unreached_limits
 from orchestrator.studies.validation.words import explanation_sentence
 from tests.studies.validation.recordings import table, with_noise
 
@@ -57,6 +58,23 @@ def test_limits_of_two_axes_are_named_together_each_at_its_own_level():
 def test_a_limit_that_explains_by_itself_is_named_without_another():
     bench = bench_of(i_q_max=1.0)
     assert list(pair_of_limits(bench, bench, first_of(bench, 0.9982))) == []
+
+
+def test_a_limit_that_is_not_reached_is_said_to_be_untold_and_one_that_acts_is_not():
+    bench = bench_of(i_q_max=1.0)
+    first = first_of(bench, 1.0)
+
+    def unreached(**values):
+        device = bench.device.with_values(values)
+        return unreached_limits(device, bench.events, first, bench.report)
+
+    assert unreached() == (D,)
+    assert unreached(**{D: 0.6}) == ()  # likely no limit, below the plant's current
+    assert unreached(**{Q: 2.0, D: 0.95}) == (D,)
+    gain = replace(first, name="pod_p.K", value=100.0)
+    assert unreached_limits(bench.device, bench.events, gain, bench.report) == ()
+    said = explanation_sentence([first], unreached=(D,))
+    assert f"does not come near {D}: the recording does not tell whether that is right" in said
 
 
 def test_a_number_that_is_no_limit_has_no_limit_beside_it():
