@@ -25,7 +25,7 @@ from orchestrator.studies.validation.figures import (
 )
 from orchestrator.studies.validation.filled import Mask, runs_of
 from orchestrator.studies.validation.frames import frames_of, grid_of_frames
-from orchestrator.studies.validation.held_by_samples import fastest_hertz, is_too_fast
+from orchestrator.studies.validation.held_by_samples import fastest_corner, is_too_fast
 from orchestrator.studies.validation.other_event import ask_of_other_event
 from orchestrator.studies.validation.out_of_step import step_loss
 from orchestrator.studies.validation.parameters import NEVER
@@ -237,7 +237,7 @@ def _slow_samples(comparison: EventComparison) -> list[Question]:
     such = ", ".join(f"{name} = {times[name]:g} s" for name in fast[:_SUCH])
     figures = {
         "interval": interval,
-        "fastest": fastest_hertz(interval),
+        "fastest": fastest_corner(interval),
         "such": f" ({such})" if such else "",
     }
     return [Question(QuestionKind.SLOW_SAMPLES, figures)]

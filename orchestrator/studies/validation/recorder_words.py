@@ -131,8 +131,8 @@ _TIMES = {
 
 def _slow_samples(x: Figures) -> str:
     return (
-        f"a sample every {1000 * x['interval']:.4g} ms holds nothing faster than {x['fastest']:.3g} Hz: controls that "
-        f"act faster{x['such']} are neither confirmed nor refuted by it"
+        f"a sample every {1000 * x['interval']:.4g} ms tells nothing of a control whose corner, 1/(2πτ), is above "
+        f"{x['fastest']:.3g} Hz: controls that act faster{x['such']} are neither confirmed nor refuted by it"
     )
 
 

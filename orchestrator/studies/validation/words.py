@@ -232,7 +232,7 @@ def untold_words(one: FittedParameter) -> str:
         case Untold.NO_EFFECT:
             return "no: it moves nothing that the recordings hold"
         case Untold.TOO_FAST:
-            return "no: it acts at frequencies above half the samples' rate"
+            return "no: it is shorter than the interval between samples"
         case Untold.AT_BOUND:
             return "no: it ends at its bound"
         case Untold.NO_BETTER:

@@ -484,7 +484,7 @@ def test_samples_that_are_too_slow_name_the_controls_that_they_do_not_show(good)
     questions = asked(good.iloc[::40])
     (found,) = [one for one in questions if one["kind"] == "slow samples"]
     assert "current_control.tau" in found["text"]
-    assert "voltage_control.tau" not in found["text"]  # 3.2 Hz, and 12.5 Hz are seen
+    assert "voltage_control.tau" not in found["text"]  # 3.2 Hz, and 4 Hz are told
 
 
 def test_slow_samples_end_no_right_model_with_not_met(good):
