@@ -156,15 +156,15 @@ def _found_again(
     low = max(start - around * abs(start), *(one.low for one in ranges))
     high = min(start + around * abs(start), *(one.high for one in ranges))
 
-    def left(value: float) -> float:
+    def squares_at(value: float) -> float:
         found = bench.responses(dict.fromkeys((one.name for one in numbers), value))
         return _REFUSED if found is None else squares_of(bench.errors(found))
 
     looked = np.linspace(low, high, _LOOKS)
-    least = int(np.argmin([left(float(one)) for one in looked]))
+    least = int(np.argmin([squares_at(float(one)) for one in looked]))
     near = float(looked[max(least - 1, 0)]), float(looked[min(least + 1, _LOOKS - 1)])
     best = optimize.minimize_scalar(
-        left, bounds=near, method="bounded", options={"xatol": _FINEST * abs(start)}
+        squares_at, bounds=near, method="bounded", options={"xatol": _FINEST * abs(start)}
     )
     return dict.fromkeys((one.name for one in numbers), float(f"{best.x:.4g}"))
 
