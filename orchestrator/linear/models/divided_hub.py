@@ -81,18 +81,6 @@ class DividedHub:
     at_rest: NDArray[np.bool_]
     whole: _Part = field(repr=False)
 
-    def taken_in(self, x: Vector) -> Vector:
-        """R·x, for the entered places' x, shape (k, c)."""
-        found = np.zeros((len(self.hub), x.shape[1]), dtype=x.dtype)
-        _take_in(self.whole, _numbers(times(self.entered, x)), _numbers(found))
-        return _put_back(found, self.hub)
-
-    def given_out(self, y: Vector) -> Vector:
-        """Rᵀ·y at the entered places, for y of shape (h, c)."""
-        found = np.zeros((self.entered.shape[0], y.shape[1]), dtype=y.dtype)
-        _give_out(self.whole, _numbers(y[self.hub]), _numbers(found))
-        return times(self.entered.T, found)
-
     def at(self, sigma: complex, inside: sp.csc_array) -> "DividedFactors":
         """Factorise T − σ − R·inside; ``inside`` has the entered places as rows, and the hub's equations as columns."""
         ordered = sp.csr_array((self.entered @ inside)[:, self.hub])
@@ -107,17 +95,16 @@ class DividedFactors:
     hub: DividedHub
     root: "_Whole | _Tied"
 
-    def solve(self, right: Vector) -> Vector:
-        return _put_back(self.root.solve(right[self.hub.hub]), self.hub.hub)
+    def solve(self, right: Vector, entered: Vector) -> Vector:
+        """Solve for right − R·x, with the entered places' x; shapes (h, c) and (k, c)."""
+        x = _numbers(times(self.hub.entered, entered))
+        return _put_back(self.root.solve(right[self.hub.hub], x), self.hub.hub)
 
-    def solve_adjoint(self, right: Vector) -> Vector:
-        return _put_back(self.root.solve_adjoint(right[self.hub.hub]), self.hub.hub)
-
-    def taken_in(self, x: Vector) -> Vector:
-        return self.hub.taken_in(x)
-
-    def given_out(self, y: Vector) -> Vector:
-        return self.hub.given_out(y)
+    def solve_adjoint(self, right: Vector) -> tuple[Vector, Vector]:
+        """Return y and Rᵀ·y, shapes (h, c) and (k, c)."""
+        out = np.zeros((self.hub.entered.shape[0], right.shape[1]), dtype=complex)
+        y = self.root.solve_adjoint(right[self.hub.hub], _numbers(out))
+        return _put_back(y, self.hub.hub), times(self.hub.entered.T, out)
 
 
 @dataclass(frozen=True)
@@ -125,48 +112,61 @@ class _Whole:
     """A part that is kept whole, inverted: a product with few vectors is faster than two triangular solutions."""
 
     inverse: Vector
+    taken: Matrix  # R
 
-    def solve(self, right: Vector) -> Vector:
-        return np.asarray(self.inverse @ right)
+    def solve(self, right: Vector, entered: Matrix) -> Vector:
+        """Solve for right − R·x, with the numbers of x (`_numbers`)."""
+        return np.asarray(self.inverse @ (right - (self.taken @ entered).view(complex)))
 
-    def solve_adjoint(self, right: Vector) -> Vector:
-        return _adjoint_times(self.inverse, right)
+    def solve_adjoint(self, right: Vector, out: Matrix) -> Vector:
+        """Solve, and add the numbers of Rᵀ·y to ``out``."""
+        y = _adjoint_times(self.inverse, right)
+        out += self.taken.T @ _numbers(y)
+        return y
 
 
 @dataclass(frozen=True)
 class _Tied:
-    """Factors of two halves and of their ties: S⁻¹ = D⁻¹ − X·K⁻¹·Vᵀ·D⁻¹ with X = D⁻¹·U and K = I + Vᵀ·X."""
+    """Factors of two halves and of their ties: S⁻¹ = D⁻¹ − X·K⁻¹·Vᵀ·D⁻¹ with X = D⁻¹·U and K = I + Vᵀ·X.
+
+    What goes through the ties is the same of both halves' answers and of what they take in: R has the ties of S."""
 
     halves: "tuple[_Whole | _Tied, _Whole | _Tied]"
     cut: int  # equations of the first half
     X: tuple[Vector, Vector]
     V: tuple[Vector, Vector]  # transposed; V₁ᵀ takes what is of the second half
     across: Vector  # K⁻¹
+    entered: tuple[Matrix, Matrix]  # what the ties take of the other half's entered places
+    entered_cut: int  # columns of R that belong to the first half
 
-    def solve(self, right: Vector) -> Vector:
-        first, second = self.halves
-        return self.beside(first.solve(right[: self.cut]), second.solve(right[self.cut :]))
+    def solve(self, right: Vector, entered: Matrix) -> Vector:
+        """See `_Whole.solve`."""
+        (first, second), cut = self.halves, self.entered_cut
+        x = entered[:cut], entered[cut:]
+        through = np.concatenate([self.entered[0] @ x[1], self.entered[1] @ x[0]])
+        one, other = first.solve(right[: self.cut], x[0]), second.solve(right[self.cut :], x[1])
+        return self.beside(one, other, through.view(complex))
 
-    def beside(self, one: Vector, other: Vector) -> Vector:
-        """Return the solution, given those of both halves alone."""
-        through = self.across @ np.concatenate([self.V[0] @ other, self.V[1] @ one])
+    def beside(self, one: Vector, other: Vector, entered: Vector | float = 0.0) -> Vector:
+        """Return the solution, given those of both halves alone, and what the ties take of the entered places."""
+        through = self.across @ (np.concatenate([self.V[0] @ other, self.V[1] @ one]) + entered)
         ties = len(self.V[0])
         return np.concatenate(
             [one - self.X[0] @ through[:ties], other - self.X[1] @ through[ties:]]
         )
 
-    def solve_adjoint(self, right: Vector) -> Vector:
-        first, second = self.halves
+    def solve_adjoint(self, right: Vector, out: Matrix) -> Vector:
+        """See `_Whole.solve_adjoint`: Uᵀ·y is known before y."""
+        (first, second), cut = self.halves, self.entered_cut
         one, other = right[: self.cut], right[self.cut :]
         through = np.concatenate([_adjoint_times(self.X[0], one), _adjoint_times(self.X[1], other)])
         through = _adjoint_times(self.across, through)
         ties = len(self.V[0])
-        return np.concatenate(
-            [
-                first.solve_adjoint(one - _adjoint_times(self.V[1], through[ties:])),
-                second.solve_adjoint(other - _adjoint_times(self.V[0], through[:ties])),
-            ]
-        )
+        out[cut:] += self.entered[0].T @ _numbers(through[:ties])
+        out[:cut] += self.entered[1].T @ _numbers(through[ties:])
+        one = first.solve_adjoint(one - _adjoint_times(self.V[1], through[ties:]), out[:cut])
+        other = second.solve_adjoint(other - _adjoint_times(self.V[0], through[:ties]), out[cut:])
+        return np.concatenate([one, other])
 
 
 def _adjoint_times(matrix: Vector, right: Vector) -> Vector:
@@ -185,8 +185,8 @@ def _factors(
         assert part.taken is not None
         schur = part.among - _dense_times(part.taken, _within(inside, part))
         schur[np.diag_indices_from(schur)] -= shift[part.hub]
-        whole = _Whole(np.linalg.inv(schur))
-        return whole, whole.solve(right)
+        whole = _Whole(np.linalg.inv(schur), part.taken)
+        return whole, whole.inverse @ right
     halves, ties = part.halves, part.ties
     cut = halves[0].hub.stop - halves[0].hub.start
     (first, one), (second, other) = (
@@ -202,7 +202,15 @@ def _factors(
     among = np.eye(begin + end, dtype=complex)
     among[:begin, begin:] = V[0] @ X[1]
     among[begin:, :begin] = V[1] @ X[0]
-    tied = _Tied((first, second), cut, X, (V[0], V[1]), np.linalg.inv(among))
+    tied = _Tied(
+        (first, second),
+        cut,
+        X,
+        (V[0], V[1]),
+        np.linalg.inv(among),
+        (ties[0].entered, ties[1].entered),
+        halves[0].entered.stop - halves[0].entered.start,
+    )
     return tied, tied.beside(one[:, begin:], other[:, end:])
 
 
@@ -220,28 +228,6 @@ def _dense_times(dense: Matrix, inside: sp.csr_array) -> Matrix:
     return np.asarray((inside.T @ dense.T).T)
 
 
-def _take_in(part: _Part, x: Matrix, found: Matrix) -> None:
-    """Add R·x to what is found, both real and in the order of the parts."""
-    if part.taken is not None:
-        found[part.hub] += part.taken @ x[part.entered]
-        return
-    assert part.halves is not None
-    for tie, half, other in zip(part.ties or (), part.halves, reversed(part.halves), strict=True):
-        found[half.hub] += tie.left @ (tie.entered @ x[other.entered])
-        _take_in(half, x, found)
-
-
-def _give_out(part: _Part, y: Matrix, found: Matrix) -> None:
-    """Add Rᵀ·y likewise."""
-    if part.taken is not None:
-        found[part.entered] += part.taken.T @ y[part.hub]
-        return
-    assert part.halves is not None
-    for tie, half, other in zip(part.ties or (), part.halves, reversed(part.halves), strict=True):
-        found[other.entered] += tie.entered.T @ (tie.left.T @ y[half.hub])
-        _give_out(half, y, found)
-
-
 def _put_back(ordered: Vector, order: Places) -> Vector:
     found = np.empty_like(ordered)
     found[order] = ordered
@@ -250,7 +236,7 @@ def _put_back(ordered: Vector, order: Places) -> Vector:
 
 def _numbers(vectors: Vector) -> Matrix:
     """The real and imaginary parts of vectors beside each other, without a copy where they lie row by row."""
-    return np.ascontiguousarray(vectors).view(float)
+    return np.ascontiguousarray(vectors, dtype=complex).view(float)
 
 
 def times(real: Matrix | sp.csr_array, vector: Vector) -> Vector:

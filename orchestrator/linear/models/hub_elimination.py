@@ -47,17 +47,13 @@ Places = NDArray[np.int64]
 
 
 class HubSolver(Protocol):
-    """The dense rest T − σ − R·P⁻¹·Q, factorised, and R itself; right sides have the shape (h, c)."""
+    """The dense rest T − σ − R·P⁻¹·Q, factorised, and R itself; right sides have the shape (h, c), x has (k, c)."""
 
-    def solve(self, right: Vector) -> Vector: ...
+    def solve(self, right: Vector, entered: Vector) -> Vector:
+        """Solve for right − R·x, with the entered places' x."""
 
-    def solve_adjoint(self, right: Vector) -> Vector: ...
-
-    def taken_in(self, x: Vector) -> Vector:
-        """R·x, for x at the entered places."""
-
-    def given_out(self, y: Vector) -> Vector:
-        """Rᵀ·y at the entered places."""
+    def solve_adjoint(self, right: Vector) -> tuple[Vector, Vector]:
+        """Return y and Rᵀ·y."""
 
 
 @dataclass(frozen=True)
@@ -65,17 +61,12 @@ class DenseHub:
     lu: tuple[Matrix, Places]
     entering: Matrix  # R
 
-    def solve(self, right: Vector) -> Vector:
-        return through_lu(self.lu, right)
+    def solve(self, right: Vector, entered: Vector) -> Vector:
+        return through_lu(self.lu, right - times(self.entering, entered))
 
-    def solve_adjoint(self, right: Vector) -> Vector:
-        return through_lu(self.lu, right, adjoint=True)
-
-    def taken_in(self, x: Vector) -> Vector:
-        return times(self.entering, x)
-
-    def given_out(self, y: Vector) -> Vector:
-        return times(self.entering.T, y)
+    def solve_adjoint(self, right: Vector) -> tuple[Vector, Vector]:
+        y = through_lu(self.lu, right, adjoint=True)
+        return y, times(self.entering.T, y)
 
     @property
     def log_determinant(self) -> complex:
@@ -118,15 +109,13 @@ class HubEquations:
 
     def _dense_hub(self) -> tuple[Matrix, Matrix]:
         """The same, row by row, as the equations are kept: many millions of numbers, each looked at once."""
-        h, k = len(self.hub), len(self.entered)
-        T, R = np.zeros((h, h)), np.zeros((h, k))
-        place = np.full(self.whole.shape[1], -1)
-        place[self.rest[self.entered]], place[self.hub] = np.arange(k), k + np.arange(h)
+        T, R = (np.empty((len(self.hub), len(some))) for some in (self.hub, self.entered))
+        entered, numbers = self.rest[self.entered], np.zeros(self.whole.shape[1])
         for row, (columns, values) in enumerate(self._equations_of_hub()):
-            places = place[columns]
-            of_hub = places >= k
-            T[row, places[of_hub] - k] = values[of_hub]
-            R[row, places[~of_hub]] = values[~of_hub]
+            numbers[columns] = values
+            np.take(numbers, self.hub, out=T[row], mode="clip")
+            np.take(numbers, entered, out=R[row], mode="clip")
+            numbers[columns] = 0.0
         return T, R
 
     def _equations_of_hub(self) -> Iterator[tuple[Places, Vector]]:
@@ -310,7 +299,7 @@ class HubFactors:
     def _solve(self, b: Vector) -> Vector:
         e = self.equations
         x = self.blocks.solve(b[e.rest])
-        y = self.port.solve(b[e.hub] - self.port.taken_in(x[e.entered]))
+        y = self.port.solve(b[e.hub], x[e.entered])
         found = np.empty_like(b)
         found[e.rest], found[e.hub] = x - self.inside @ y, y
         return found
@@ -318,9 +307,9 @@ class HubFactors:
     def _solve_adjoint(self, b: Vector) -> Vector:
         e = self.equations
         beside = (self.inside.T @ b[e.rest].conj()).conj()
-        y = self.port.solve_adjoint(b[e.hub] - beside)
+        y, out = self.port.solve_adjoint(b[e.hub] - beside)
         rest = b[e.rest]
-        rest[e.entered] -= self.port.given_out(y)
+        rest[e.entered] -= out
         found = np.empty_like(b)
         found[e.rest], found[e.hub] = self.blocks.solve(rest, "H"), y
         return found
@@ -348,11 +337,8 @@ def hub_equations(
     F: sp.csr_array, G: sp.csr_array, H: sp.csr_array, K: sp.csr_array
 ) -> HubEquations | None:
     """The equations with their hub; None where there is no hub worth setting apart."""
-    n = F.shape[0]
-    taken = _places_taken(G, K)
-    if len(taken) < K.shape[0]:
-        G, H, K = G[:, taken], H[taken], K[taken][:, taken]
-    whole = sp.block_array([[F, G], [H, K - sp.eye_array(len(taken))]], format="csr")
+    n, G, K = F.shape[0], _without_zeros(G), _without_zeros(K)
+    whole = _put_together(F, G, H=H, K=K, taken=_places_taken(G, K))
     busy = np.diff(whole.indptr) > BUSY
     if busy.sum() < LEAST_HUB:
         return None
@@ -361,14 +347,66 @@ def hub_equations(
     return HubEquations(whole, n, np.flatnonzero(busy), rest)
 
 
+def _without_zeros(matrix: sp.csr_array) -> sp.csr_array:
+    """The matrix without numbers that are there and 0; itself where there are none."""
+    if matrix.data.all():
+        return matrix
+    found = matrix.copy()
+    found.eliminate_zeros()
+    return found
+
+
 def _places_taken(G: sp.csr_array, K: sp.csr_array) -> Places:
-    """Places in w of what reaches a next state, at once or through other values."""
+    """Places in w of what reaches a next state, at once or through other values; no number of both is 0."""
     reached = np.zeros(G.shape[1], dtype=bool)
-    reached[G.indices[G.data != 0]] = True
+    reached[G.indices] = True
     new = reached.copy()
     while new.any():
-        of_new = np.repeat(new, np.diff(K.indptr)) & (K.data != 0)
         more = reached.copy()
-        more[K.indices[of_new]] = True
+        for row in np.flatnonzero(new).tolist():
+            more[K.indices[K.indptr[row] : K.indptr[row + 1]]] = True
         new, reached = more & ~reached, more
     return np.flatnonzero(reached)
+
+
+def _put_together(
+    F: sp.csr_array, G: sp.csr_array, *, H: sp.csr_array, K: sp.csr_array, taken: Places
+) -> sp.csr_array:
+    """[[F, G], [H, K − 1]], of w the places that are taken.
+
+    Most numbers are a network's answers, many millions in few rows. Each is written once, to where it stays."""
+    n, m = F.shape[0], len(taken)
+    states, w = np.arange(n), np.full(K.shape[0], -1)
+    w[taken] = n + np.arange(m)
+    less_one = -sp.eye_array(K.shape[0], format="csr")
+    if K.diagonal().any():
+        K, less_one = sp.csr_array(K + less_one), sp.csr_array(K.shape)
+    parts = (
+        (F, states, 0, states),
+        (G, states, 0, w),
+        (H, taken, n, states),
+        (K, taken, n, w),
+        (less_one, taken, n, w),
+    )
+    counts = np.zeros(n + m, dtype=np.int64)
+    for part, rows, first, _ in parts:
+        counts[first : first + len(rows)] += np.diff(part.indptr)[rows]
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    columns, values = np.empty(starts[-1], dtype=np.int32), np.empty(starts[-1])
+    free = starts[:-1].copy()  # where the next number of each row goes
+    for part, rows, first, names in parts:
+        names = names.astype(np.int32)
+        lengths = np.diff(part.indptr)[rows]
+        for k in np.flatnonzero(lengths > BUSY).tolist():
+            begin, to = part.indptr[rows[k]], free[first + k]
+            own, place = slice(begin, begin + lengths[k]), slice(to, to + lengths[k])
+            columns[place], values[place] = names[part.indices[own]], part.data[own]
+        short = np.flatnonzero(lengths <= BUSY)
+        some = part[rows[short]]
+        before = np.repeat(free[first + short] - some.indptr[:-1], lengths[short])
+        places = before + np.arange(some.nnz)
+        columns[places], values[places] = names[some.indices], some.data
+        free[first : first + len(rows)] += lengths
+    if starts[-1] <= np.iinfo(np.int32).max:
+        starts = starts.astype(np.int32)
+    return sp.csr_array((values, columns, starts), shape=(n + m, n + m))
