@@ -11,6 +11,7 @@ it is factorised and solved with a small part of the dense operations. Ties belo
 a close one: `HubFactors.solve_exactly` corrects it by the equations themselves."""
 
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 import scipy.linalg
@@ -32,7 +33,6 @@ _DIRECTIONS = 64  # random directions that look for the ties of two halves, to b
 _SPARE = 8  # how many of them must find nothing
 _WORTH = 0.5  # a division that keeps more numbers than this part of the dense matrix is none
 _TURNS = 60  # of the power iteration for the line along which a part is cut
-_FAR_COUNT = 0.25  # exponent of what groups tell each other, where a part is cut
 
 Places = NDArray[np.int64]
 
@@ -268,8 +268,16 @@ def through_lu(lu: tuple[Matrix, Places], right: Vector, *, adjoint: bool = Fals
     return np.asarray(found)
 
 
+class Rows(Protocol):
+    """A matrix of which some rows at a time are looked at."""
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, rows: slice, /) -> Matrix: ...
+
+
 def divide(
-    T: Matrix, R: Matrix, at_rest: NDArray[np.bool_], owner: Places, taker: Places
+    T: Matrix, R: Rows, scale: Vector, at_rest: NDArray[np.bool_], owner: Places, taker: Places
 ) -> DividedHub | None:
     """Divide a hub; None where its parts have too many ties.
 
@@ -277,33 +285,30 @@ def divide(
     ----------
     T, R
         The hub's equations by its own unknowns and by the entered places, shapes (h, h) and (h, k).
+    scale
+        Size of each equation, without the diagonal of T.
     at_rest
         Equations in which σ stands, shape (h,).
     owner, taker
         Group of each of the hub's unknowns and of each entered place; what is of one group is not parted.
     """
-    own = T.diagonal().copy()
-    np.fill_diagonal(T, 0.0)
-    scale = np.sqrt(sum(np.einsum("ij,ij->i", matrix, matrix) for matrix in (T, R)))
-    np.fill_diagonal(T, own)
-    scale = np.where(scale > 0, scale, 1.0)
-    R, in_common, taker = _in_common(R, scale, taker)
+    L, in_common, taker = _in_common(R, scale, taker)
     sizes = np.bincount(owner)
-    leaves = _leaves(_nearness(T, R, owner, taker), sizes)
+    leaves = _leaves(_nearness(T, L, owner, taker), sizes)
     place = np.empty(len(sizes), dtype=np.int64)
     place[np.concatenate(leaves)] = np.arange(len(sizes))
     hub, entered = (np.argsort(place[of], kind="stable") for of in (owner, taker))
     cuts = np.cumsum([0, *map(len, leaves)])
     edges = [np.searchsorted(place[of][o], cuts) for of, o in ((owner, hub), (taker, entered))]
-    T, R = _in_order(T, hub, hub), _in_order(R, hub, entered)
-    builder = _Builder(T, R, scale[hub], edges)
+    T, L = _in_order(T, hub, hub), _in_order(L, hub, entered)
+    builder = _Builder(T, L, scale[hub], edges)
     whole = builder.part(0, len(leaves))
-    if whole.size > _WORTH * (T.size + R.size):
+    if whole.size > _WORTH * (T.size + L.size):
         return None
     return DividedHub(hub, in_common[entered], at_rest[hub], whole)
 
 
-def _in_common(R: Matrix, scale: Vector, taker: Places) -> tuple[Matrix, sp.csr_array, Places]:
+def _in_common(R: Rows, scale: Vector, taker: Places) -> tuple[Matrix, sp.csr_array, Places]:
     """Return all that the hub takes of each group in as few columns as say it: R = L·C.
 
     All currents of a bus move the hub as currents of that bus do, whatever device they come from.
@@ -313,18 +318,19 @@ def _in_common(R: Matrix, scale: Vector, taker: Places) -> tuple[Matrix, sp.csr_
     L of shape (h, c), C as sparse rows, shape (c, k), and the group of each column of L.
     """
     if not len(taker):
-        return R, sp.csr_array((0, 0)), taker
+        return R[:], sp.csr_array((0, 0)), taker
     order = np.argsort(taker, kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(taker[order])) + 1)
     tried = max(map(len, groups)) + _SPARE
-    weights = np.random.default_rng(0).standard_normal((tried, len(R))) / np.sqrt(tried)
-    answers = weights / scale @ R
+    weights = np.random.default_rng(0).standard_normal((tried, len(R))) / np.sqrt(tried) / scale
+    parts = [slice(begin, begin + _ROWS) for begin in range(0, len(R), _ROWS)]
+    answers = sum((weights[:, part] @ R[part] for part in parts), np.zeros((tried, len(taker))))
     said = [_rows_of(answers[:, group], len(R)) for group in groups]
     by_group = sp.block_diag(said, format="csr")
     common = by_group[:, np.argsort(order)]
     L = np.empty((len(R), common.shape[0]))
-    for begin in range(0, len(R), _ROWS):
-        L[begin : begin + _ROWS] = (common @ R[begin : begin + _ROWS].T).T
+    for part in parts:
+        L[part] = (common @ R[part].T).T
     return L, common, np.repeat(taker[[group[0] for group in groups]], list(map(len, said)))
 
 
@@ -429,9 +435,10 @@ def _leaves(near: Matrix, sizes: Places) -> list[Places]:
 def _cut(near: Matrix, groups: Places, sizes: Places) -> tuple[Places, Places]:
     """Cut where the groups tell each other least: along the second eigenvector of what they tell, by their own sums.
 
-    Far groups tell each other little and not nothing; a root makes them count, and the cut follows the network."""
+    Far groups tell each other little and not nothing; a fourth root makes them count, and the cut follows the
+    network."""
     tell = near[np.ix_(groups, groups)]
-    tell = (tell + tell.T) ** _FAR_COUNT
+    tell = np.sqrt(np.sqrt(tell + tell.T))
     np.fill_diagonal(tell, 0.0)
     sums = tell.sum(axis=1)
     sums[sums == 0] = 1.0

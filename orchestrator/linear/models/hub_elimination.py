@@ -77,6 +77,30 @@ class DenseHub:
 
 
 @dataclass(frozen=True)
+class _DenseRows:
+    """Some columns of the hub's equations, dense where rows are asked for: all of them take hundreds of megabytes."""
+
+    whole: sp.csr_array
+    hub: Places
+    columns: Places
+
+    def __len__(self) -> int:
+        return len(self.hub)
+
+    def __getitem__(self, rows: slice) -> Matrix:
+        starts, numbers = self.whole.indptr, np.zeros(self.whole.shape[1])
+        some = self.hub[rows]
+        found = np.empty((len(some), len(self.columns)))
+        for k, row in enumerate(some.tolist()):
+            own = slice(starts[row], starts[row + 1])
+            places = self.whole.indices[own]
+            numbers[places] = self.whole.data[own]
+            np.take(numbers, self.columns, out=found[k], mode="clip")
+            numbers[places] = 0.0
+        return found
+
+
+@dataclass(frozen=True)
 class HubEquations:
     """The equations of a linear model without σ, in their parts, and what does not depend on σ."""
 
@@ -104,19 +128,15 @@ class HubEquations:
     @cached_property
     def whole_hub(self) -> tuple[Matrix, Matrix]:
         """T, and of R the columns that are not zero, column by column: nearly full, as they are."""
-        T, R = self._dense_hub()
-        return T, np.asfortranarray(R)
+        return self._columns(self.hub)[:], np.asfortranarray(self._columns(self._of_rest)[:])
 
-    def _dense_hub(self) -> tuple[Matrix, Matrix]:
-        """The same, row by row, as the equations are kept: many millions of numbers, each looked at once."""
-        T, R = (np.empty((len(self.hub), len(some))) for some in (self.hub, self.entered))
-        entered, numbers = self.rest[self.entered], np.zeros(self.whole.shape[1])
-        for row, (columns, values) in enumerate(self._equations_of_hub()):
-            numbers[columns] = values
-            np.take(numbers, self.hub, out=T[row], mode="clip")
-            np.take(numbers, entered, out=R[row], mode="clip")
-            numbers[columns] = 0.0
-        return T, R
+    @property
+    def _of_rest(self) -> Places:
+        """Places of the entered unknowns among all."""
+        return self.rest[self.entered]
+
+    def _columns(self, places: Places) -> "_DenseRows":
+        return _DenseRows(self.whole, self.hub, places)
 
     def _equations_of_hub(self) -> Iterator[tuple[Places, Vector]]:
         """Yield the columns and the numbers of each equation."""
@@ -154,7 +174,7 @@ class HubEquations:
     @cached_property
     def divided(self) -> DividedHub | None:
         """The hub in halves; None where that is not worth while."""
-        Q, (T, R) = self.quadrants[1], self._dense_hub()
+        Q, T, R = self.quadrants[1], self._columns(self.hub)[:], self._columns(self._of_rest)
         count, block = self.blocks
         entries = Q.tocoo()
         rows, columns = block[entries.coords[0]], count + entries.coords[1]
@@ -163,10 +183,21 @@ class HubEquations:
         owner, taker = group[count:], group[block[self.entered]]
         # what no equation of the hub moves belongs to the one that takes most of it
         still = ~np.isin(taker, owner)
-        taker[still] = owner[np.abs(R[:, still]).argmax(axis=0)]
+        if still.any():
+            takes = self._columns(self._of_rest[still])[:]
+            taker[still] = owner[np.abs(takes).argmax(axis=0)]
         numbers = np.unique(owner)
         owner, taker = (np.searchsorted(numbers, of) for of in (owner, taker))
-        return divide(T, R, self.hub < self.states, owner, taker)
+        return divide(T, R, self._sizes, self.hub < self.states, owner, taker)
+
+    @property
+    def _sizes(self) -> Vector:
+        """Size of each of the hub's equations, but for what it takes of its own unknown; 1 where it takes nothing."""
+        equations = zip(self.hub.tolist(), self._equations_of_hub(), strict=True)
+        sizes = np.array(
+            [np.linalg.norm(values[columns != row]) for row, (columns, values) in equations]
+        )
+        return np.where(sizes > 0, sizes, 1.0)
 
     def at(self, sigma: complex) -> "HubFactors | None":
         """Factorise at σ; None where σ is so close to an eigenvalue of a block that the answer would be inaccurate."""
@@ -376,7 +407,7 @@ def _put_together(
 
     Most numbers are a network's answers, many millions in few rows. Each is written once, to where it stays."""
     n, m = F.shape[0], len(taken)
-    states, w = np.arange(n), np.full(K.shape[0], -1)
+    states, w = np.arange(n, dtype=np.int32), np.full(K.shape[0], -1, dtype=np.int32)
     w[taken] = n + np.arange(m)
     less_one = -sp.eye_array(K.shape[0], format="csr")
     if K.diagonal().any():
@@ -395,7 +426,6 @@ def _put_together(
     columns, values = np.empty(starts[-1], dtype=np.int32), np.empty(starts[-1])
     free = starts[:-1].copy()  # where the next number of each row goes
     for part, rows, first, names in parts:
-        names = names.astype(np.int32)
         lengths = np.diff(part.indptr)[rows]
         for k in np.flatnonzero(lengths > BUSY).tolist():
             begin, to = part.indptr[rows[k]], free[first + k]

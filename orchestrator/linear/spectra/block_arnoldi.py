@@ -45,11 +45,25 @@ to a factor of two, and with a fifth of the vectors to a quarter."""
 _EQUAL = 1e-6  # values of ν that differ by less than this part are one
 
 
+class Room:
+    """Memory for the vectors of one search after the other: to fill new memory takes longer than to use it again."""
+
+    def __init__(self) -> None:
+        self._numbers = np.empty(0, dtype=complex)
+
+    def columns(self, rows: int, count: int) -> Vector:
+        """Return vectors as columns, whatever stands in them; those returned before are no longer to be used."""
+        if rows * count > len(self._numbers):
+            self._numbers = np.empty(rows * count, dtype=complex)
+        return self._numbers[: rows * count].reshape((rows, count), order="F")
+
+
 class BlockArnoldi:
     """The eigenvalues ν of largest size of an operator, and vectors, from a space that grows.
 
     ``apply``: The operator, for complex vectors as columns, shape (n, k).
     ``width``: Vectors that are taken at once.
+    ``room``: Where the vectors stand; the search is over when another one takes it.
 
     ``values``, ``accuracy``: Approximations of the eigenvalues, largest first; and how large what they leave over is,
     as a part of each."""
@@ -61,12 +75,13 @@ class BlockArnoldi:
         most: int = MOST,
         *,
         width: int = WIDTHS[0],
+        room: Room | None = None,
     ) -> None:
         self._apply, self._size = apply, size
         self.width = max(1, min(width, size // 2))
         self._most = max(min(most, size - self.width), self.width)
         self._random = np.random.default_rng(0)  # the same search gives the same answer
-        self._basis = np.empty((size, self._most + self.width), dtype=complex, order="F")
+        self._basis = (room or Room()).columns(size, self._most + self.width)
         self._image = np.zeros((self._most + self.width, self._most), dtype=complex)
         self._sketch = sketch(size, _IMAGE * (self._most + self.width))
         self._images = np.empty(

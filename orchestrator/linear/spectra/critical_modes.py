@@ -17,7 +17,7 @@ from orchestrator.core.errors import AnalysisError
 from orchestrator.core.threads import one_thread
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra import modes as spectra
-from orchestrator.linear.spectra.block_arnoldi import MOST, TOLERANCE, WIDTHS, BlockArnoldi
+from orchestrator.linear.spectra.block_arnoldi import MOST, TOLERANCE, WIDTHS, BlockArnoldi, Room
 from orchestrator.linear.spectra.left_vectors import left_vectors
 from orchestrator.linear.spectra.region_cells import RegionCell
 
@@ -133,7 +133,7 @@ def _search(
 ) -> list[spectra.Mode]:
     """Cover the region with discs. If a disc is too small, find more eigenvalues around its point, or cut the cell."""
     modes: list[spectra.Mode] = []
-    stretch = _STRETCH
+    stretch, rooms = _STRETCH, (Room(), Room())
     waiting = [RegionCell(lowest, highest, -_UNSTABLE_MARGIN, damping)]
     while waiting:
         cell, *rest = waiting.pop().highest(stretch)
@@ -142,7 +142,7 @@ def _search(
             raise AnalysisError(
                 f"more than {_AT_A_TIME[1]} modes lie at {cell.centre:.4g} rad/s; compute the full spectrum instead"
             )
-        search, known, values = _searched(model, cell)
+        search, known, values = _searched(model, cell, rooms)
         if known is None:
             waiting += cell.halves()
         else:
@@ -158,12 +158,12 @@ def _search(
 
 
 def _searched(
-    model: LinearModel, cell: RegionCell
+    model: LinearModel, cell: RegionCell, rooms: tuple[Room, Room]
 ) -> "tuple[Search, RegionCell | None, NDArray[np.complex128]]":
     """Search around a cell's centre: the part of the cell in which all is known, None where there is too much, and the
     eigenvalues around. The point is not on one of them."""
     for moved in (0.0, 0.02, 0.05):
-        search = Search(model, cell.centre + moved * cell.radius)
+        search = Search(model, cell.centre + moved * cell.radius, rooms)
         known, values = search.covering(cell, (1 + moved) * cell.radius)
         if (
             known is None
@@ -182,10 +182,15 @@ class Search:
     """Arnoldi's method on (A − σI)⁻¹ around one point λ = ``centre``.
 
     ``sigma``: The point in the plane of A's own eigenvalues.
-    ``reach``: Distance from ``sigma`` up to which the last search has found every eigenvalue."""
+    ``reach``: Distance from ``sigma`` up to which the last search has found every eigenvalue.
 
-    def __init__(self, model: LinearModel, centre: complex) -> None:
+    ``rooms``: where right and left vectors stand while they are searched; one search at a time has them."""
+
+    def __init__(
+        self, model: LinearModel, centre: complex, rooms: tuple[Room, Room] | None = None
+    ) -> None:
         self._model, self.centre = model, centre
+        self._rooms = rooms or (Room(), Room())
         self.sigma = np.exp(centre * model.step_size) if model.step_size else centre
         with one_thread():
             try:
@@ -292,7 +297,9 @@ class Search:
     ) -> NDArray[np.complex128] | None:
         """Eigenvalues up to `reach`; None where they are too many. Equal ones are looked for with more vectors."""
         for width in WIDTHS:
-            blocks = BlockArnoldi(self._solver.solve, len(self._model.names), width=width)
+            blocks = BlockArnoldi(
+                self._solver.solve, len(self._model.names), width=width, room=self._rooms[0]
+            )
             self._blocks = blocks
             if not _grow(blocks, enough):
                 return None
@@ -339,7 +346,9 @@ class Search:
     def _left_by_search(self, wanted: NDArray[np.complex128], width: int) -> Vector:
         """Left eigenvectors of some ν by a search in the adjoint equations, with as many vectors at once."""
         size = len(self._model.names)
-        adjoint = BlockArnoldi(self._solver.solve_adjoint, size, 2 * MOST, width=width)
+        adjoint = BlockArnoldi(
+            self._solver.solve_adjoint, size, 2 * MOST, width=width, room=self._rooms[1]
+        )
         if not _grow(adjoint, lambda found: _partners(found, wanted) is not None):
             raise self._not_converging
         return adjoint.vectors(_partners(adjoint, wanted) or ())

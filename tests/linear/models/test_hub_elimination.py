@@ -67,6 +67,24 @@ def test_the_hub_is_the_voltages_and_the_networks_states_and_the_rest_falls_apar
     assert equations.whole.shape[0] == STATES + 2 * UNITS  # without what leads nowhere
 
 
+@pytest.mark.parametrize("own", [0.0, 1.0, 0.3])
+def test_the_equations_hold_each_number_once(own):
+    """Places in w may take themselves, and a number that is there and 0 takes nothing from what leads nowhere."""
+    given = system()
+    K = given.K.toarray()
+    K[3, 3] = K[UNITS + 4, UNITS + 4] = own
+    nowhere = 2 * UNITS + 5
+    rows, columns = given.G.nonzero()
+    entries = np.append(given.G.toarray()[rows, columns], 0.0)
+    places = (np.append(rows, 1), np.append(columns, nowhere))
+    G = sp.csr_array(sp.coo_array((entries, places), shape=given.G.shape))
+    assert G.nnz == given.G.nnz + 1
+    whole = hub_equations(given.F, G, given.H, sp.csr_array(K)).whole
+    taken = slice(2 * UNITS)
+    F, G, H = given.F.toarray(), G.toarray()[:, taken], given.H.toarray()[taken]
+    assert (whole.toarray() == np.block([[F, G], [H, K[taken, taken] - np.eye(2 * UNITS)]])).all()
+
+
 @pytest.mark.parametrize("sigma", [0.7, -0.3 + 5j])
 def test_both_equations_are_solved(sigma):
     model = system()

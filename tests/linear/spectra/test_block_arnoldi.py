@@ -195,7 +195,7 @@ def test_modes_as_often_there_as_vectors_at_once_are_looked_for_with_more(
     monkeypatch.setattr(
         BlockArnoldi,
         "__init__",
-        lambda self, *given, width: widths.append(width) or made(self, *given, width=width),
+        lambda self, *given, **named: widths.append(named["width"]) or made(self, *given, **named),
     )
     found = find_critical_modes(model(*[complex(-0.2, 5.0)] * often), 0.79, 0.81, 0.1)
     assert len(found) == often
