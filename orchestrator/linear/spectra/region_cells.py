@@ -49,9 +49,11 @@ class RegionCell:
         between = (self.least + self.most) / 2
         return replace(self, most=between), replace(self, least=between)
 
-    def highest(self, stretch: float) -> "tuple[RegionCell, ...]":
-        """Cut off its highest frequencies, up to a ratio, and return them and what is left."""
-        if self.high <= stretch * self.low:
+    def highest(self, stretch: float, along: float = 1.0) -> "tuple[RegionCell, ...]":
+        """Cut off its highest frequencies, up to a ratio, and return them and what is left.
+
+        ``along``: factor by which the ratio may be larger where nothing is left then."""
+        if self.high <= stretch * along * self.low:
             return (self,)
         cut = self.high / stretch
         return replace(self, low=cut), replace(self, high=cut)

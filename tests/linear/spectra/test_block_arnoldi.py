@@ -14,6 +14,7 @@ from orchestrator.linear.spectra import critical_modes
 from orchestrator.linear.spectra.block_arnoldi import WIDTHS, BlockArnoldi
 from orchestrator.linear.spectra.critical_modes import Search, find_critical_modes
 from orchestrator.linear.spectra.modes import find_modes
+from orchestrator.linear.spectra.region_cells import RegionCell
 from orchestrator.linear.spectra.sketch import sketch
 from tests.linear.models.test_hub_elimination import UNSTABLE, system
 
@@ -239,6 +240,35 @@ def test_a_rough_value_beside_the_region_may_lie_in_it(real, known, in_blocks):
     beside = [1 / (complex(real, 5.0) - 5j), *(1 / (-9.0 - k) for k in range(8))]
     blocks = blocks_with(beside, [5e-3, *[1e-3] * 8])
     assert search._knows(blocks, 1.0, lambda value: value.real > -0.5) is known
+
+
+@pytest.mark.parametrize(
+    ("share", "least"), [(0.6, critical_modes._ENOUGH), (0.8, critical_modes._MANY)]
+)
+def test_a_search_goes_on_where_little_is_left_of_its_cell(share, least, in_blocks, monkeypatch):
+    search = Search(model(complex(-0.2, 5.0)), 5j)
+    search.reach = 0.5
+    cell = RegionCell(4.0, 6.0, -0.1, 0.1)
+    part = replace(cell, high=4.0 * (6.0 / 4.0) ** share)
+    looks = []
+    monkeypatch.setattr(
+        search, "_known_part", lambda blocks, *_: looks.append(blocks.count) or part
+    )
+    known, _ = search.covering(cell, 2.0)
+    assert known is part
+    assert looks[-2] < least <= looks[-1] < 1.3 * least
+    assert search.vectors_taken == looks[-1]
+
+
+@pytest.mark.parametrize(
+    ("high", "vectors", "ratio"),
+    [(3.0, 40, 1.8), (3.0, 112, 1.5), (3.0, 176, 1.25), (2.1, 220, 1.2), (9.0, 40, 2.5)],
+)
+def test_stretches_get_longer_where_few_vectors_are_enough_and_shorter_in_crowds(
+    high, vectors, ratio
+):
+    known = RegionCell(2.0, high, -0.1, 0.1)
+    assert critical_modes._next_stretch(known, vectors) == pytest.approx(ratio)
 
 
 def test_an_adjoint_that_is_another_systems_is_noticed(in_blocks, monkeypatch):

@@ -48,3 +48,5 @@ def test_cells_are_cut_and_joined_again():
     assert upper.joined(lower) is None
     assert lower.joined(RegionCell(upper.low, 9.0, 0.0, 0.1)) is None
     assert CELL.highest(5.0) == (CELL,)
+    assert CELL.highest(4.0, 1.2) == (CELL,)  # 4.8 holds its ratio of 4.5
+    assert len(CELL.highest(3.0, 1.2)) == 2
