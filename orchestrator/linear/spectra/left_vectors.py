@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from orchestrator.core.arrays import Vector
 from orchestrator.linear.models.linear_model import LinearModel
 
-MOST_POINTS = 6
+MOST_POINTS = 4
 """Points beside eigenvalues up to which this costs less than a search in the adjoint equations: one is a factorisation,
-and a search of 200 vectors takes as long as seven of them (2,869 buses)."""
+and a search of 200 vectors takes as long as seven of them (2,869 buses), one of 144 as long as three and a half (9,241
+buses)."""
 
 _TOGETHER = 0.1
 """Eigenvalues nearer to each other than this part of their distance from the point of the search share a point, and
