@@ -207,9 +207,9 @@ def _factors(
         cut,
         X,
         (V[0], V[1]),
-        np.linalg.inv(among),
-        (ties[0].entered, ties[1].entered),
-        halves[0].entered.stop - halves[0].entered.start,
+        across=np.linalg.inv(among),
+        entered=(ties[0].entered, ties[1].entered),
+        entered_cut=halves[0].entered.stop - halves[0].entered.start,
     )
     return tied, tied.beside(one[:, begin:], other[:, end:])
 

@@ -30,9 +30,11 @@ _WIDENING = 1.2
 points. The next stretch is longer than the known part by this factor where fewer vectors were enough, and shorter by it
 where there were more: crowds of modes get short stretches."""
 
-_SHORTEST, _LONGEST = 1.2, 2.5
-"""Smallest and largest ratio of the ends of such a stretch. A disc is as wide as the region, so that a shorter stretch
-needs hardly fewer vectors (112 for a ratio of 1.02 and 140 for 1.2, 9,241 buses)."""
+_SHORTEST = 1.2
+"""Smallest ratio of the ends of such a stretch. A disc is as wide as the region, so that a shorter stretch needs hardly
+fewer vectors (112 for a ratio of 1.02 and 140 for 1.2, 9,241 buses)."""
+
+_LONGEST = 2.5  # largest ratio of the ends of such a stretch
 
 _ALONG = 1.2
 """What such a stretch leaves of its range is taken along where the ends' ratio grows by this factor at most: a point of
@@ -49,9 +51,11 @@ _LEAST_PART = 0.3
 """What a part must have of the frequencies of its cell with `_ENOUGH` vectors, or more are taken; it is less with more,
 as a crowd is not waited for."""
 
-_NEARLY, _MANY = 0.7, 200
-"""A part of at least this share of its cell's frequencies does not end a search before so many vectors: some more show
+_NEARLY = 0.7
+"""A part of at least this share of its cell's frequencies does not end a search before `_MANY` vectors: some more show
 the whole cell mostly, and what is left on both sides would need points of its own."""
+
+_MANY = 200  # vectors from which on such a part is enough, as they cost more than another point
 
 _AT_A_TIME = (20, 80)
 """Numbers of eigenvalues to find around one point: the first number, and the largest one if the first does not reach
