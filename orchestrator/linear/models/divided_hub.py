@@ -268,7 +268,7 @@ def through_lu(lu: tuple[Matrix, Places], right: Vector, *, adjoint: bool = Fals
     return np.asarray(found)
 
 
-class Rows(Protocol):
+class SomeRows(Protocol):
     """A matrix of which some rows at a time are looked at."""
 
     def __len__(self) -> int: ...
@@ -277,7 +277,7 @@ class Rows(Protocol):
 
 
 def divide(
-    T: Matrix, R: Rows, scale: Vector, at_rest: NDArray[np.bool_], owner: Places, taker: Places
+    T: Matrix, R: SomeRows, scale: Vector, at_rest: NDArray[np.bool_], owner: Places, taker: Places
 ) -> DividedHub | None:
     """Divide a hub; None where its parts have too many ties.
 
@@ -308,7 +308,7 @@ def divide(
     return DividedHub(hub, in_common[entered], at_rest[hub], whole)
 
 
-def _in_common(R: Rows, scale: Vector, taker: Places) -> tuple[Matrix, sp.csr_array, Places]:
+def _in_common(R: SomeRows, scale: Vector, taker: Places) -> tuple[Matrix, sp.csr_array, Places]:
     """Return all that the hub takes of each group in as few columns as say it: R = L·C.
 
     All currents of a bus move the hub as currents of that bus do, whatever device they come from.

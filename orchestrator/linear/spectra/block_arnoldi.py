@@ -45,7 +45,7 @@ to a factor of two, and with a fifth of the vectors to a quarter."""
 _EQUAL = 1e-6  # values of ν that differ by less than this part are one
 
 
-class Room:
+class VectorRoom:
     """Memory for the vectors of one search after the other: to fill new memory takes longer than to use it again."""
 
     def __init__(self) -> None:
@@ -75,13 +75,13 @@ class BlockArnoldi:
         most: int = MOST,
         *,
         width: int = WIDTHS[0],
-        room: Room | None = None,
+        room: VectorRoom | None = None,
     ) -> None:
         self._apply, self._size = apply, size
         self.width = max(1, min(width, size // 2))
         self._most = max(min(most, size - self.width), self.width)
         self._random = np.random.default_rng(0)  # the same search gives the same answer
-        self._basis = (room or Room()).columns(size, self._most + self.width)
+        self._basis = (room or VectorRoom()).columns(size, self._most + self.width)
         self._image = np.zeros((self._most + self.width, self._most), dtype=complex)
         self._sketch = sketch(size, _IMAGE * (self._most + self.width))
         self._images = np.empty(

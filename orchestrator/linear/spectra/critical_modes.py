@@ -17,7 +17,13 @@ from orchestrator.core.errors import AnalysisError
 from orchestrator.core.threads import one_thread
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra import modes as spectra
-from orchestrator.linear.spectra.block_arnoldi import MOST, TOLERANCE, WIDTHS, BlockArnoldi, Room
+from orchestrator.linear.spectra.block_arnoldi import (
+    MOST,
+    TOLERANCE,
+    WIDTHS,
+    BlockArnoldi,
+    VectorRoom,
+)
 from orchestrator.linear.spectra.left_vectors import left_vectors
 from orchestrator.linear.spectra.region_cells import RegionCell
 
@@ -148,7 +154,7 @@ def _search(
 ) -> list[spectra.Mode]:
     """Cover the region with discs. If a disc is too small, find more eigenvalues around its point, or cut the cell."""
     modes: list[spectra.Mode] = []
-    stretch, rooms = _STRETCH, (Room(), Room())
+    stretch, rooms = _STRETCH, (VectorRoom(), VectorRoom())
     waiting = [RegionCell(lowest, highest, -_UNSTABLE_MARGIN, damping)]
     along = _ALONG if model.is_searched_in_blocks else 1.0
     while waiting:
@@ -182,7 +188,7 @@ def _next_stretch(known: RegionCell, vectors: int) -> float:
 
 
 def _searched(
-    model: LinearModel, cell: RegionCell, rooms: tuple[Room, Room]
+    model: LinearModel, cell: RegionCell, rooms: tuple[VectorRoom, VectorRoom]
 ) -> "tuple[Search, RegionCell | None, NDArray[np.complex128]]":
     """Search around a cell's centre: the part of the cell in which all is known, None where there is too much, and the
     eigenvalues around. The point is not on one of them."""
@@ -211,10 +217,13 @@ class Search:
     ``rooms``: where right and left vectors stand while they are searched; one search at a time has them."""
 
     def __init__(
-        self, model: LinearModel, centre: complex, rooms: tuple[Room, Room] | None = None
+        self,
+        model: LinearModel,
+        centre: complex,
+        rooms: tuple[VectorRoom, VectorRoom] | None = None,
     ) -> None:
         self._model, self.centre = model, centre
-        self._rooms = rooms or (Room(), Room())
+        self._rooms = rooms or (VectorRoom(), VectorRoom())
         self.sigma = np.exp(centre * model.step_size) if model.step_size else centre
         with one_thread():
             try:
