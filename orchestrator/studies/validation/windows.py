@@ -33,6 +33,15 @@ _GROWS = 2  # lags that pass from a slow event's begin until its change is abrup
 _BENDS_BEFORE = 0.5  # time [s] before the earliest begin that shows a straight line
 _CANDIDATES = 100  # begins that are compared, and three times as many samples
 _LASTS = 0.3  # part of the largest change over the lag, from which on a change is still the event
+_CORNERS = (0.04, 0.1)
+"""Times [s] over which a signal bends at the begin and the end of a second change."""
+_LEAST_CORNER = 5e-4  # smallest such bend [pu]
+_CORNER_BESIDE_FIRST = 0.04
+"""Part of the event's first bend that the corner of a second change has at least.
+
+One as large as the first has it over 0.1 s if it lasts for up to 2.5 s."""
+_STANDS_OUT = 3.0
+"""Times the bends on both sides, from which on one is a corner: those beside a swing's largest are half of it."""
 
 
 @dataclass(frozen=True)
@@ -250,7 +259,48 @@ def _end(still: Complex, begin: int, change: Numbers, lag: int, interval: float)
     away = np.flatnonzero(np.abs(magnitude[within] - usual) > _EXCURSION)
     if len(away):
         return begin + 2 + int(away[-1])
+    end = _end_of_change(change, begin, lag, interval)
+    second = _second_change(still, begin, interval)
+    return end if second is None else max(end, _end_of_change(change, second, lag, interval))
+
+
+def _end_of_change(change: Numbers, begin: int, lag: int, interval: float) -> int:
+    """The sample at which a change that begins at one has ended; what lasts for a second and longer is a swing."""
     near = change[begin : begin + round(_LONGEST_EVENT / interval)]
     lasting = np.flatnonzero(near > _LASTS * near.max(initial=0.0))
     last = int(lasting[-1]) + lag if len(lasting) else 0
     return begin + max(last if last * interval < 1.0 else 0, round(_SHORTEST / interval), 1)
+
+
+def _second_change(still: Complex, begin: int, interval: float) -> int | None:
+    """The sample of the last corner in the course of a signal, or of its magnitude, up to the longest event's end.
+
+    A ramp or a slow return that follows an event's first change begins and ends with a corner. A swing has none: its
+    bends grow and fall with it. The corner stands out from the bends on both its sides, and is no afterthought beside
+    the first change."""
+    found = [
+        corner
+        for time in _CORNERS
+        for signal in (still, np.abs(still).astype(complex))
+        for corner in _corners(signal, begin, max(1, round(time / interval)), interval)
+    ]
+    return max(found, default=None)
+
+
+def _corners(signal: Complex, begin: int, lag: int, interval: float) -> list[int]:
+    """The corners of a signal after the bend with which its event begins, which lasts for two lags and a mean."""
+    width = max(1, round(_SMOOTHED * lag))
+    bends = _bends(signal, lag)
+    usual = float(bends[2 * lag : begin].max(initial=0.0))
+    first = float(bends[begin : begin + 2 * lag + width].max(initial=0.0))
+    least = max(_ABOVE * usual, _LEAST_CORNER, _CORNER_BESIDE_FIRST * first)
+    aside, far = lag + lag // 2 + width, 4 * lag + width
+    begins = begin + 2 * lag + width
+    ends = min(begin + round(_LONGEST_EVENT / interval) + lag, len(bends) - far)
+    found = []
+    for at in range(begins + far, ends):
+        near = bends[at - lag : at + lag + 1]
+        beside = max(bends[at - far : at - aside].max(), bends[at + aside : at + far].max())
+        if bends[at] == near.max() and bends[at] > max(least, _STANDS_OUT * beside):
+            found.append(at - lag - width // 2)
+    return found
