@@ -5,7 +5,7 @@ per unit of the rating, its largest magnitude, its mean, and the mean of its mag
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,6 +43,8 @@ _SLOWEST_PERIODS = 1.5  # periods of a mode that a window has to hold
 _OTHER_LOOKS = ((0.03, 0), (0.06, 0), (0.0, -2), (0.0, 2))
 """Other looks at a ring-down, to see what they change: the part left out at its begin, and how many exponentials more
 the model has, as an oscillation takes two."""
+_OTHER_LOOKS_AT_SEVERAL = (*_OTHER_LOOKS, (0.1, 0), (0.1, 2), (0.15, 0))
+"""The same where several modes are strong, which noise moves further than one by itself."""
 _LAST = 0.03  # part of a ring-down at its end that is left out, where the filter of a recorder ends
 _AS_STRONG = 0.5  # part of the strongest mode's amplitude, above which another one may pass for it
 _SAME_MODE = 0.3  # part of the frequency by which two modes may differ and be the same
@@ -113,17 +115,42 @@ class SignalNoise:
 
 
 @dataclass(frozen=True)
+class ComparedMode:
+    """A strong mode of the measured signal, and the simulated one's same mode, or None where that has none.
+
+    ``doubt``: of how far they are apart, by other looks: [%], [points of percent]."""
+
+    modes: tuple[IdentifiedMode, IdentifiedMode | None]
+    doubt: tuple[float, float] = (0.0, 0.0)
+
+    def as_json(self) -> dict[str, object]:
+        measured, own = self.modes
+        return {
+            "measured": _mode_json(measured),
+            "simulated": _mode_json(own),
+            "frequency_doubt_percent": self.doubt[0],
+            "damping_doubt_points": self.doubt[1],
+        }
+
+
+@dataclass(frozen=True)
 class SignalFigures:
     """Figures of one signal outside of windows, measured and simulated."""
 
     delay: float | None  # by which the measured one comes later [s]
     steps: tuple[StepFigures | None, StepFigures | None]
-    modes: ModePair
-    modes_doubt: tuple[float, float] = (
-        0.0,
-        0.0,
-    )  # of how far these are apart: [%], [points of percent]
+    compared_modes: Sequence[ComparedMode] = ()  # of the measured signal's strong modes
     strong_modes: ModeLists = ((), ())  # nearly as strong as the strongest one, by frequency
+
+    @property
+    def modes(self) -> ModePair:
+        """The strongest mode of the measured signal, and the simulated one's same mode."""
+        return self.compared_modes[0].modes if self.compared_modes else (None, None)
+
+    @property
+    def modes_doubt(self) -> tuple[float, float]:
+        """Of how far these are apart: [%], [points of percent]."""
+        return self.compared_modes[0].doubt if self.compared_modes else (0.0, 0.0)
 
     def as_json(self) -> dict[str, object]:
         step = [one.as_json() if one else None for one in self.steps]
@@ -137,6 +164,7 @@ class SignalFigures:
                 "simulated": mode[1],
                 "frequency_doubt_percent": self.modes_doubt[0],
                 "damping_doubt_points": self.modes_doubt[1],
+                "compared_modes": [one.as_json() for one in self.compared_modes],
                 "strong_modes": {"measured": strong[0], "simulated": strong[1]},
             },
         }
@@ -267,36 +295,46 @@ def _ring_downs(
     signals: tuple[Numbers, Numbers],
     windows: Windows,
     more: int = 0,
+    least: int = 2,
     identify: Identify = modes_without_doubts,
 ) -> ModeLists:
     """The modes with which the measured and the simulated signal ring after the event.
 
     Both have the measured one's order: at an order of its own, each would have other modes. ``more``: how many
-    exponentials are added to it."""
+    exponentials are added to it; ``least``: how many it has at least."""
     curves = [_ringing(recording, values, windows) for values in signals]
-    order = 0 if curves[0] is None else max(2, order_of(curves[0]) + more)
+    order = 0 if curves[0] is None else max(least, order_of(curves[0]) + more)
     measured, own = (_modes(recording, one, windows, order, identify) for one in curves)
     return measured, own
 
 
-def _same_mode(measured: Sequence[IdentifiedMode], own: Sequence[IdentifiedMode]) -> ModePair:
-    """The mode with which the measured signal rings the most, and the simulated one's same mode."""
-    if not measured:
-        return None, None
-    strongest = measured[0]
-    others = [
-        one
-        for one in own
-        if abs(one.frequency_hz - strongest.frequency_hz) < _SAME_MODE * strongest.frequency_hz
+def _same_modes(
+    sought: Sequence[IdentifiedMode | None], modes: Sequence[IdentifiedMode]
+) -> list[IdentifiedMode | None]:
+    """For each mode that is sought the same one of a list, which is of a near frequency; None where there is none.
+
+    No mode is taken twice: of all pairs the nearest one comes first."""
+    pairs = [
+        (abs(other.eigenvalue - one.eigenvalue), k, j)
+        for k, one in enumerate(sought)
+        if one is not None
+        for j, other in enumerate(modes)
+        if abs(other.frequency_hz - one.frequency_hz) < _SAME_MODE * one.frequency_hz
     ]
-    same = min(others, key=lambda one: abs(one.eigenvalue - strongest.eigenvalue), default=None)
-    return strongest, same
+    taken: dict[int, int] = {}
+    for _, k, j in sorted(pairs):
+        if k not in taken and j not in taken.values():
+            taken[k] = j
+    return [modes[taken[k]] if k in taken else None for k in range(len(sought))]
 
 
 def _strong(modes: Sequence[IdentifiedMode]) -> list[IdentifiedMode]:
-    """The modes that another look may take for the strongest one, by frequency."""
-    strong = [one for one in modes if one.amplitude > _AS_STRONG * modes[0].amplitude]
-    return sorted(strong, key=lambda one: one.frequency_hz)
+    """The modes that another look may take for the strongest one, strongest first."""
+    return [one for one in modes if one.amplitude > _AS_STRONG * modes[0].amplitude]
+
+
+def _by_frequency(modes: Sequence[IdentifiedMode]) -> list[IdentifiedMode]:
+    return sorted(modes, key=lambda one: one.frequency_hz)
 
 
 def modes_apart(modes: ModePair) -> tuple[float, float] | None:
@@ -308,23 +346,47 @@ def modes_apart(modes: ModePair) -> tuple[float, float] | None:
     return frequency, own.damping_percent - measured.damping_percent
 
 
-def _doubt_of_modes(
+def _compared_modes(
+    recording: Recording, signals: tuple[Numbers, Numbers], windows: Windows, rings: ModeLists
+) -> list[ComparedMode]:
+    """The strong modes of the measured signal, each beside the simulated one's, with what other looks make of them."""
+    strong = _strong(rings[0])
+    own = _same_modes(strong, rings[1])
+    looks = [] if not any(own) else list(_other_looks(recording, signals, windows, (strong, own)))
+    found = []
+    for k, pair in enumerate(zip(strong, own, strict=True)):
+        doubt = _doubt_of_mode(pair, [look[k] for look in looks])
+        found.append(ComparedMode(pair, doubt))
+    return found
+
+
+def _other_looks(
     recording: Recording,
     signals: tuple[Numbers, Numbers],
     windows: Windows,
-    found: ModePair,
-) -> tuple[float, float]:
+    sought: tuple[Sequence[IdentifiedMode], Sequence[IdentifiedMode | None]],
+) -> Iterator[list[ModePair]]:
+    """The same modes, measured and simulated, as each other look at the ring-down shows them.
+
+    With fewer exponentials than all strong modes take, a look would lose one of them by itself."""
+    rest, least = recording.length - windows.end, 2 * len(sought[0])
+    looks = _OTHER_LOOKS_AT_SEVERAL if len(sought[0]) > 1 else _OTHER_LOOKS
+    for part, more in looks:
+        later = replace(windows, end=windows.end + part * rest)
+        measured, own = _ring_downs(recording, signals, later, more, least)
+        yield list(zip(_same_modes(sought[0], measured), _same_modes(sought[1], own), strict=True))
+
+
+def _doubt_of_mode(found: ModePair, looks: Sequence[ModePair]) -> tuple[float, float]:
     """How far the difference of two modes moves by other looks at the ring-down.
 
     A look that does not show both modes leaves in doubt whether they differ at all."""
     here = modes_apart(found)
     if here is None:
         return 0.0, 0.0
-    rest = recording.length - windows.end
     seen = [here]
-    for part, more in _OTHER_LOOKS:
-        later = replace(windows, end=windows.end + part * rest)
-        there = modes_apart(_same_mode(*_ring_downs(recording, signals, later, more)))
+    for look in looks:
+        there = modes_apart(look)
         seen.append((-here[0], -here[1]) if there is None else there)
     frequency, damping = 0.5 * np.ptp(np.array(seen), axis=0)
     return float(frequency), float(damping)
@@ -375,12 +437,11 @@ def compare_signals(
     found = {}
     for name, y, x in (("p", measured.real, own.real), ("q", measured.imag, own.imag)):
         rings = _ring_downs(recording, (y, x), windows, identify=strongest_modes)
-        modes = _same_mode(*rings)
+        measured_modes, own_modes = (_by_frequency(_strong(modes)) for modes in rings)
         found[name] = SignalFigures(
             delay_between(recording, y, x, windows),
             (step_of(recording, y, windows), step_of(recording, x, windows)),
-            modes,
-            modes_doubt=_doubt_of_modes(recording, (y, x), windows, modes),
-            strong_modes=(_strong(rings[0]), _strong(rings[1])),
+            _compared_modes(recording, (y, x), windows, rings),
+            strong_modes=(measured_modes, own_modes),
         )
     return found

@@ -14,7 +14,13 @@ from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
 from orchestrator.core.toml_files import Table, fault_of, read_toml
 from orchestrator.studies.validation.event import EventComparison, JumpDoubt
-from orchestrator.studies.validation.figures import ErrorFigures, ModeLists, modes_apart
+from orchestrator.studies.validation.figures import (
+    ComparedMode,
+    ErrorFigures,
+    ModeLists,
+    SignalFigures,
+    modes_apart,
+)
 
 Signal = Literal["p", "q", "i_p", "i_q"]
 Window = Literal["before", "during", "after"]
@@ -64,13 +70,15 @@ class OpenCause(StrEnum):
     FIXED_STEP = "fixed step"
     RING_DOWN = "ring-down"
     NO_FIGURE = "no figure"
+    NO_SUCH_MODE = "no such mode"
 
 
 @dataclass(frozen=True)
 class Criterion:
     """One figure beside its limit; ``noise``: what the recording's scatter alone may make of the figure.
 
-    ``why_open``: None where it is met or not. ``rings``: the strong modes of a ring-down that stays open."""
+    ``why_open``: None where it is met or not. ``rings``: the strong modes of a ring-down that stays open; ``mode_hz``:
+    the frequency of the plant's mode that is off the most, where several are compared."""
 
     recording: str
     name: str
@@ -82,6 +90,12 @@ class Criterion:
     device: str = ""
     why_open: OpenCause | None = None
     rings: ModeLists = ((), ())
+    mode_hz: float | None = None
+
+    @property
+    def said(self) -> str:
+        """The name, with the mode where several are compared."""
+        return self.name if self.mode_hz is None else f"{self.name} at {self.mode_hz:.3g} Hz"
 
     @property
     def place(self) -> str:
@@ -99,6 +113,7 @@ class Criterion:
             "of_noise": self.noise,
             "verdict": str(self.verdict),
             "why_open": None if self.why_open is None else str(self.why_open),
+            "mode_hz": self.mode_hz,
         }
 
 
@@ -209,7 +224,6 @@ def _of_ring_down(limits: LimitTables, comparison: EventComparison) -> Iterator[
     label = comparison.event.recording.label
     for signal, limit in limits.ring_down.items():
         figures = comparison.signals[signal]
-        apart = modes_apart(figures.modes)
         rows = (
             ("frequency", limit.frequency_percent, "%"),
             ("damping", limit.damping_points, "points"),
@@ -217,21 +231,42 @@ def _of_ring_down(limits: LimitTables, comparison: EventComparison) -> Iterator[
         for k, (name, most, unit) in enumerate(rows):
             if most is None:
                 continue
-            value = None if apart is None else abs(apart[k])
-            noise = figures.modes_doubt[k]
-            verdict = LimitVerdict.OPEN
-            if value is not None:
-                verdict = _verdict(value, noise, most, grows=False)
-            place = f"ring-down {signal} {name}"
-            unclear = value is not None and verdict is LimitVerdict.OPEN
-            yield Criterion(
+            place = Criterion(
                 label,
-                place,
+                f"ring-down {signal} {name}",
                 unit,
-                value,
+                None,
                 most,
-                noise=noise,
-                verdict=verdict,
-                why_open=OpenCause.RING_DOWN if unclear else None,
-                rings=figures.strong_modes if unclear else ((), ()),
+                noise=0.0,
+                verdict=LimitVerdict.OPEN,
             )
+            yield _of_worst_mode(place, figures, k)
+
+
+_FROM_WORST = (LimitVerdict.NOT_MET, LimitVerdict.OPEN, LimitVerdict.MET)
+
+
+def _of_worst_mode(place: Criterion, figures: SignalFigures, k: int) -> Criterion:
+    """The criterion of the strong mode that is worst beside its limit; ``k``: 0 for frequency, 1 for damping."""
+    several = len(figures.compared_modes) > 1
+    found = [
+        replace(
+            _of_mode(place, one, k),
+            mode_hz=one.modes[0].frequency_hz if several else None,
+        )
+        for one in figures.compared_modes
+    ]
+    if not found:
+        return place
+    worst = min(found, key=lambda one: (_FROM_WORST.index(one.verdict), -(one.value or 0.0)))
+    return replace(worst, rings=figures.strong_modes) if worst.why_open else worst
+
+
+def _of_mode(place: Criterion, compared: ComparedMode, k: int) -> Criterion:
+    apart = modes_apart(compared.modes)
+    if apart is None:
+        return replace(place, why_open=OpenCause.NO_SUCH_MODE)
+    value, noise = abs(apart[k]), compared.doubt[k]
+    verdict = _verdict(value, noise, place.limit, grows=False)
+    why = OpenCause.RING_DOWN if verdict is LimitVerdict.OPEN else None
+    return replace(place, value=value, noise=noise, verdict=verdict, why_open=why)

@@ -13,6 +13,7 @@ from orchestrator.core.asked import whole_number
 from orchestrator.core.errors import number_of
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder
+from orchestrator.linear.signals.identification import IdentifiedMode
 from orchestrator.output.report.column_table import ShownTable
 from orchestrator.output.report.notebook import page
 from orchestrator.output.report.pdf import print_pdf
@@ -332,7 +333,7 @@ def _events_table(result: ValidationResult) -> PlainTable:
         label = one.event.recording.label
         _, signal, figures = one.largest_error
         windows, begin, power = one.event.windows, one.event.recording.begin, one.event.start.power
-        modes = one.signals["p"].modes
+        compared = one.signals["p"].compared_modes
         rows.append(
             (
                 label,
@@ -341,13 +342,16 @@ def _events_table(result: ValidationResult) -> PlainTable:
                 f"{figures.max_error:.4f} of {signal.upper()}",
                 f"{figures.max_at:.4g}",
                 swing_cell(one),
-                *(
-                    f"{m.frequency_hz:.3g} Hz, {m.damping_percent:.3g} %" if m else "–"
-                    for m in modes
-                ),
+                *(_rings([mode.modes[k] for mode in compared]) for k in (0, 1)),
             )
         )
     return make_table("Events", *columns, rows=rows)
+
+
+def _rings(modes: Sequence[IdentifiedMode | None]) -> str:
+    """Frequency and damping of each strong mode, one a line; a dash where there is none."""
+    lines = [f"{m.frequency_hz:.3g} Hz, {m.damping_percent:.3g} %" if m else "–" for m in modes]
+    return "\n".join(lines) or "–"
 
 
 def _windows_table(one: EventComparison) -> PlainTable:

@@ -305,6 +305,7 @@ _WHY_OPEN = {
     "shorter one",
     OpenCause.RING_DOWN: "seen from a little later on, or by a model of another order, the ring-down has another mode",
     OpenCause.NO_FIGURE: "the recording shows none",
+    OpenCause.NO_SUCH_MODE: "the plant rings with a mode that the model does not show",
 }
 
 
@@ -315,7 +316,7 @@ def open_sentence(criteria: Sequence[Criterion], devices: Sequence[PlayedDevice]
         return ""
     said = []
     for cause in OpenCause:
-        names = dict.fromkeys(one.name for one in left if one.why_open is cause)
+        names = dict.fromkeys(one.said for one in left if one.why_open is cause)
         if not names:
             continue
         hint = ""

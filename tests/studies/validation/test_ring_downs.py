@@ -60,14 +60,20 @@ def apart(measured, simulated):
     return modes_apart(figures.modes), figures.modes_doubt
 
 
-def said(measured, simulated):
-    """What is said about the limits of the ring-down."""
+def criterion(measured, simulated):
+    """The damping of the ring-down beside its limit."""
     comparison = SimpleNamespace(
         event=SimpleNamespace(recording=SimpleNamespace(label="rec")),
         signals={"p": compared(measured, simulated)},
     )
     limits = LimitTables(source="here", ring_down={"p": RingDownLimits(damping_points=LIMIT)})
-    return open_sentence(list(_of_ring_down(limits, comparison)), [])
+    (found,) = _of_ring_down(limits, comparison)
+    return found
+
+
+def said(measured, simulated):
+    """What is said about the limits of the ring-down."""
+    return open_sentence([criterion(measured, simulated)], [])
 
 
 def scattering(values, size, seed):
@@ -129,3 +135,56 @@ def test_a_single_mode_whose_damping_is_open_is_not_named_again():
     text = said(scattering(rings(one), 5e-3, 1), scattering(rings(one), 1.25e-3, 10))
     assert "ring-down p damping" in text
     assert "the plant has" not in text
+
+
+ALIKE = ((0.76, 0.10, 0.04), (0.31, 0.12, 0.036))
+"""Two modes of nearly equal size, in the order of their size."""
+WRONG_FIRST = ((0.76, 0.05, 0.04), ALIKE[1])
+WRONG_SECOND = (ALIKE[0], (0.31, 0.04, 0.036))
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("model", "hertz", "points"), [(WRONG_FIRST, 0.76, 5), (WRONG_SECOND, 0.31, 8)]
+)
+def test_of_two_modes_alike_the_one_that_is_off_counts(model, hertz, points, seed):
+    plant = scattering(rings(*ALIKE), 4e-4, seed)
+    found = criterion(plant, scattering(rings(*model), 1e-4, 100 + seed))
+    assert found.verdict is LimitVerdict.NOT_MET
+    assert found.value == pytest.approx(points, abs=0.7)
+    assert found.as_json()["mode_hz"] == pytest.approx(hertz, rel=0.03)
+    assert found.said.endswith(f"at {found.mode_hz:.3g} Hz")
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_of_two_modes_alike_both_are_in_json_each_beside_the_models(seed):
+    plant = scattering(rings(*ALIKE), 4e-4, seed)
+    figures = compared(plant, scattering(rings(*WRONG_SECOND), 1e-4, 100 + seed))
+    shown = figures.as_json()["ring_down"]["compared_modes"]
+    pairs = {
+        round(one["measured"]["frequency_hz"], 1): (
+            one["measured"]["damping_percent"],
+            one["simulated"]["damping_percent"],
+        )
+        for one in shown
+    }
+    assert pairs == {
+        0.8: pytest.approx((10, 10), abs=0.5),
+        0.3: pytest.approx((12, 4), abs=0.7),
+    }
+
+
+@pytest.mark.parametrize("noise", [4e-4, 2e-3])
+@pytest.mark.parametrize("seed", range(5))
+def test_two_modes_alike_of_a_right_model_are_met(seed, noise):
+    plant = scattering(rings(*ALIKE), noise, seed)
+    found = criterion(plant, scattering(rings(*ALIKE), noise / 4, 100 + seed))
+    assert found.verdict is LimitVerdict.MET
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_mode_that_the_model_lacks_is_told(seed):
+    """Its other mode is right, and decides nothing by itself."""
+    plant = scattering(rings(*ALIKE), 4e-4, seed)
+    text = said(plant, scattering(rings(ALIKE[0]), 1e-4, 100 + seed))
+    assert re.search(r"ring-down p damping at 0\.31\d* Hz \(the plant rings with a mode", text)
