@@ -3,6 +3,7 @@ integral of the frequency beside it.
 
 Where the device has to run to know, as of another sign or another side of a transformer, `hypotheses` asks."""
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -27,6 +28,11 @@ _HELD = 0.2  # part of the samples with the angle of the sample before, from whi
 _AT_REST = 1e-3  # range [rad] of an angle, or of a frequency's integral, that moves no power
 _STRAIGHT = 1e-5  # range [rad] of an angle beside its straight line, below which it tells nothing
 _SAME = (0.5, 2.0)  # factors between an angle and its frequency's integral that may be one's own
+_OTHER_REFERENCE = math.radians(3.0)
+"""Movement [rad] of an angle beyond its frequency's integral: noise of 1 mHz and a filter of 0.3 s make less."""
+_OF_JUMP = 0.2  # part of the largest jump of an angle, which a filtered frequency follows late
+_JUMPS_WITHIN = 0.1  # [s]
+_MOST_SAMPLES = 20, 80  # percentiles within which samples count: a fault lasts for a moment
 _UNEXPLAINED = 0.5  # part of the angle that its frequency's integral may leave, to name a factor
 
 
@@ -60,11 +66,15 @@ def questions_of_hold(angle: Numbers) -> Iterator[Question]:
 
 
 def questions_beside_frequency(
-    times: Numbers, angle: Numbers, integrated: Numbers, channel: RecordedChannel
+    times: Numbers,
+    angles: tuple[Numbers, Numbers],
+    channel: RecordedChannel,
+    frequency: RecordedChannel,
 ) -> Iterator[Question]:
-    """Ask about an angle that is not the integral of its own frequency: of another unit, sign or frame.
+    """Ask about an angle that is not the integral of its own frequency: of another unit, sign or reference.
 
-    ``integrated``: the frequency's integral [rad]."""
+    ``angles``: the recorded one, and the frequency's integral [rad]."""
+    angle, integrated = angles
     known = np.isfinite(angle)
     line = np.vander(times[known], 2)
     own, other = (
@@ -78,6 +88,29 @@ def questions_beside_frequency(
     if not _SAME[0] < factor < _SAME[1] and rest < _UNEXPLAINED:
         remedy = channel.changed(factor=round(1 / factor, 6))
         yield Question(QuestionKind.ANGLE_AND_FREQUENCY, {"factor": factor, "remedy": remedy})
+        return
+    apart = _beyond_filter(times[known], own, other)
+    if apart > max(_OTHER_REFERENCE, _OF_JUMP * _largest_jump(times[known], own)):
+        figures = {"apart": math.degrees(apart), "remedy": frequency.as_text()}
+        yield Question(QuestionKind.ANGLE_REFERENCE, figures)
+
+
+def _beyond_filter(times: Numbers, own: Numbers, other: Numbers) -> float:
+    """How far an angle moves beyond its frequency's integral [rad], but for moments and for what a filter makes.
+
+    A filtered frequency gives an angle behind a lag: the derivatives of the integral stand for that."""
+    slope = np.gradient(other, times)
+    columns = np.column_stack([slope, np.gradient(slope, times)])
+    rest = own - other
+    rest = rest - columns @ np.linalg.lstsq(columns, rest, rcond=None)[0]
+    low, high = np.percentile(rest, _MOST_SAMPLES)
+    return float(high - low)
+
+
+def _largest_jump(times: Numbers, angle: Numbers) -> float:
+    """The largest change of an angle over a short time [rad]."""
+    lag = max(1, round(_JUMPS_WITHIN / float(np.median(np.diff(times)))))
+    return float(np.abs(angle[lag:] - angle[:-lag]).max(initial=0.0))
 
 
 def _largest(values: Numbers) -> float:

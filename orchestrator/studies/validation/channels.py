@@ -158,8 +158,12 @@ def channels_in(
     given_by = [read_channel(text, [*columns, "time"]) for text in given]
     found = {channel.role: channel for channel in given_by}
     several = {}
+    # a frequency that is given stands for an angle that is not
+    stands_for = {"angle"} if "f" in found and "angle" not in found else set()
     for role in ROLES:
-        likely = [c for c in columns if role not in found and _fits(role, c, dataset, place)]
+        if role in found or role in stands_for:
+            continue
+        likely = [c for c in columns if _fits(role, c, dataset, place)]
         if len(likely) == 1:
             found[role] = RecordedChannel(role, likely[0])
         elif likely:

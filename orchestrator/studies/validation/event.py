@@ -12,6 +12,7 @@ import numpy as np
 from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.devices.fmi.port_mapping import BoundDescription
 from orchestrator.studies.validation.angle_jump import ask_of_angle_jump
+from orchestrator.studies.validation.angle_reference import ask_of_swing_before
 from orchestrator.studies.validation.device import OperatingStart, Played, PlayedDevice
 from orchestrator.studies.validation.figures import (
     SIGNALS,
@@ -360,10 +361,20 @@ def _of_response(comparison: EventComparison) -> list[Question]:
     found += _over_limit(comparison)
     found += _slow_samples(comparison)
     found += _without_noise(comparison)
-    of_other = _of_plant(comparison) or ask_of_other_event(event.recording, played.power)
-    of_other = of_other or _of_step(comparison)
-    found += of_other or ask_of_setpoint(event.recording, event.windows, played.power)
-    return found
+    return found + _first_asked(comparison)
+
+
+def _first_asked(comparison: EventComparison) -> list[Question]:
+    """The first question of those of which one makes the others likely."""
+    recording, windows = comparison.event.recording, comparison.event.windows
+    own = comparison.played.power
+    return (
+        ask_of_swing_before(recording, windows, own)
+        or _of_plant(comparison)
+        or ask_of_other_event(recording, own)
+        or _of_step(comparison)
+        or ask_of_setpoint(recording, windows, own)
+    )
 
 
 def _over_limit(comparison: EventComparison) -> list[Question]:

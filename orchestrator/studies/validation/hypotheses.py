@@ -13,6 +13,7 @@ import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.core.options import Option
+from orchestrator.studies.validation.angle_reference import ask_of_lacking_frequency
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import (
     EventComparison,
@@ -30,7 +31,12 @@ from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.record import PortBases, Recording, at_port
 from orchestrator.studies.validation.transformer import AT_PORT, Between, Beyond
 
-_UNREADABLE = (QuestionKind.OTHER_EVENT, QuestionKind.ANGLE_JUMP, QuestionKind.STORED_TWICE)
+_UNREADABLE = (
+    QuestionKind.OTHER_EVENT,
+    QuestionKind.ANGLE_JUMP,
+    QuestionKind.ANGLE_REFERENCE,
+    QuestionKind.STORED_TWICE,
+)
 _OFF = (
     0.25  # part of the movement by which a response is off, from which on other readings are tried
 )
@@ -204,7 +210,12 @@ def question_readings(comparison: EventComparison, bases: PortBases) -> list[Que
         explained += _rated_otherwise(comparison, whole)
     # what leaves more than the plant moved explains nothing, as of a model that falls out of step
     explained = [one for one in explained if one[0] * whole <= math.hypot(*moved)]
-    return [min(explained, key=lambda one: one[0])[1]] if explained else []
+    if explained:
+        return [min(explained, key=lambda one: one[0])[1]]
+    if any(one.keeps_open for one in comparison.questions):
+        return []
+    rated = comparison.device.rated_hz
+    return ask_of_lacking_frequency(event.recording, event.windows, comparison.played.power, rated)
 
 
 def _is_off_later(comparison: EventComparison) -> bool:

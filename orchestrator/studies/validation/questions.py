@@ -34,6 +34,7 @@ class QuestionKind(StrEnum):
     LOST_JUMP = "angle lacks a jump"
     LOST_STEP = "magnitude lacks a step"
     ANGLE_JUMP = "angle jumps alone"
+    ANGLE_REFERENCE = "angle reference"
     STORED_TWICE = "stored twice"
     LAGGED = "behind a lag"
     PLANT_OUT_OF_STEP = "plant out of step"

@@ -464,7 +464,9 @@ class _Reading:
         angle[known] = np.unwrap(angle[known])
         if "f" in self.channels:
             turned = self._integrated()
-            self.questions += questions_beside_frequency(self.times, angle, turned, channel)
+            angles = (angle, turned)
+            frequency = self.channels["f"]
+            self.questions += questions_beside_frequency(self.times, angles, channel, frequency)
         return np.asarray(angle)
 
     def _hertz(self) -> Numbers:

@@ -100,7 +100,7 @@ def _angle_and_frequency(x: Figures) -> str:
 
 def _frequency_alone(x: Figures) -> str:
     return (
-        "there is no angle, and the voltage's is the integral of the frequency, which recorders filter for 0.1 s and "
+        "no angle is read, and the voltage's is the integral of the frequency, which recorders filter for 0.1 s and "
         "longer: steps of the angle are missing. Give the angle where it was recorded"
     )
 
@@ -208,6 +208,37 @@ def _angle_jump(x: Figures) -> str:
     )
 
 
+def _angle_reference(x: Figures) -> str:
+    if "remedy" in x:
+        return (
+            f"the angle leaves the integral of the recording's own frequency by up to {x['apart']:.3g} deg: was it "
+            "taken against a bus that swings itself? Give an angle against a clock, with "
+            + _channel("angle=COLUMN")
+            + ", or the frequency in its place, with "
+            + _channel(x["remedy"])
+        )
+    if "offset" in x:
+        return (
+            f"from {x['at']:.4g} s on P is {x['offset']:+.3g} pu off the model's in the mean, while the recorded angle "
+            f"turns by no more than {1000 * abs(x['hertz']):.2g} mHz, which no droop answers so: was the angle taken "
+            "against a bus of the same grid, which moves itself, or did a setpoint change? "
+            + _OTHER_ANGLE
+        )
+    return (
+        f"before the event the angle moves the model by {x['asked']:.2g} pu, and P and Q move by {x['seen']:.2g} pu: "
+        "was the angle taken against a bus that swings itself, or is a control of the model off in the plant? "
+        + _OTHER_ANGLE
+    )
+
+
+_OTHER_ANGLE = (
+    "Give an angle against a clock, with "
+    + _channel("angle=COLUMN")
+    + ", or the frequency in its place, with "
+    + _channel("f=COLUMN")
+)
+
+
 def _stored_twice(x: Figures) -> str:
     return (
         f"{x['count']} samples in a row, from {x['first']:.4g} s on, come again to the last digit from {x['at']:.4g} s "
@@ -312,6 +343,7 @@ RECORDER_SENTENCES: Mapping[QuestionKind, Sentence] = {
     QuestionKind.LOST_JUMP: _lost_jump,
     QuestionKind.LOST_STEP: _lost_step,
     QuestionKind.ANGLE_JUMP: _angle_jump,
+    QuestionKind.ANGLE_REFERENCE: _angle_reference,
     QuestionKind.STORED_TWICE: _stored_twice,
     QuestionKind.STUCK: _stuck,
     QuestionKind.POWER_HELD: _power_held,
