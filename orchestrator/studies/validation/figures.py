@@ -149,7 +149,7 @@ class SignalFigures:
 
     @property
     def modes_doubt(self) -> tuple[float, float]:
-        """Of how far these are apart: [%], [points of percent]."""
+        """The doubt of how far these are apart: [%], [points of percent]."""
         return self.compared_modes[0].doubt if self.compared_modes else (0.0, 0.0)
 
     def as_json(self) -> dict[str, object]:
