@@ -93,7 +93,7 @@ class Criterion:
     mode_hz: float | None = None
 
     @property
-    def said(self) -> str:
+    def shown_name(self) -> str:
         """The name, with the mode where several are compared."""
         return self.name if self.mode_hz is None else f"{self.name} at {self.mode_hz:.3g} Hz"
 

@@ -228,7 +228,7 @@ def _left_open(result: ValidationResult) -> Iterator[str]:
         yield f"Without a limit, and not judged: {', '.join(without)}."
     for one in result.criteria:
         if one.verdict is LimitVerdict.OPEN:
-            yield f"Open: {one.said} of {one.place}; the recording does not decide it."
+            yield f"Open: {one.shown_name} of {one.place}; the recording does not decide it."
     for comparison in result.comparisons:
         for asked in comparison.questions:
             if asked.keeps_open:

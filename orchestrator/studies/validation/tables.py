@@ -59,7 +59,7 @@ def criteria_table(
 def _criterion_cells(criterion: Criterion, *, by_device: bool) -> tuple[str, ...]:
     return (
         criterion.place if by_device else criterion.recording,
-        criterion.said,
+        criterion.shown_name,
         "–" if criterion.value is None else f"{criterion.value:.4g} {criterion.unit}",
         f"{criterion.limit:g} {criterion.unit}",
         str(criterion.verdict),

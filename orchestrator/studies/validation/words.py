@@ -316,7 +316,7 @@ def open_sentence(criteria: Sequence[Criterion], devices: Sequence[PlayedDevice]
         return ""
     said = []
     for cause in OpenCause:
-        names = dict.fromkeys(one.said for one in left if one.why_open is cause)
+        names = dict.fromkeys(one.shown_name for one in left if one.why_open is cause)
         if not names:
             continue
         hint = ""

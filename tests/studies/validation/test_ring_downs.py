@@ -153,7 +153,7 @@ def test_of_two_modes_alike_the_one_that_is_off_counts(model, hertz, points, see
     assert found.verdict is LimitVerdict.NOT_MET
     assert found.value == pytest.approx(points, abs=0.7)
     assert found.as_json()["mode_hz"] == pytest.approx(hertz, rel=0.03)
-    assert found.said.endswith(f"at {found.mode_hz:.3g} Hz")
+    assert found.shown_name.endswith(f"at {found.mode_hz:.3g} Hz")
 
 
 @pytest.mark.parametrize("seed", range(3))
