@@ -26,6 +26,11 @@ def folder() -> Path:
     return path
 
 
+def kept() -> Path:
+    """The folder of studies in which all workers keep the systems that they computed."""
+    return shared_folder() / "parks"
+
+
 def written(name, *changes):
     """A file with the case, and pieces of text in place of others."""
     text = (folder() / "park.toml").read_text(encoding="utf-8")
@@ -42,9 +47,7 @@ def studied(path=None, values=None, **wanted):
     plan = plan_interactions(
         load_case(path or folder() / "park.toml"), InteractionsRequest(values=values, **wanted)
     )
-    return Interactions(
-        run_interactions(plan, Work(Serial(), PointStore(shared_folder() / "points of parks")))
-    )
+    return Interactions(run_interactions(plan, Work(Serial(), PointStore(kept() / "points"))))
 
 
 park = cache(studied)

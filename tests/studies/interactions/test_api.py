@@ -4,13 +4,13 @@ import pytest
 
 import orchestrator as gfor
 from orchestrator.core.errors import InputError
-from tests.studies.interactions.park import folder, park
+from tests.studies.interactions.park import folder, kept, park
 
 
 def test_the_face_gives_what_the_command_gives(fmu_path):
     """Systems that a folder keeps are read; a device that is not in the case is swapped where it is asked for."""
     known, case = park().worst_pair, gfor.load(folder() / "park.toml")
-    found = case.interactions(folder=folder(), devices={"D": fmu_path("gfl_l2ep")}, places=["east"])
+    found = case.interactions(folder=kept(), devices={"D": fmu_path("gfl_l2ep")}, places=["east"])
     assert found.worst_pair == known == ("A", "B")
     assert found.stable is True
     assert found.result.stored == 8
