@@ -11,6 +11,7 @@ from orchestrator.face.cli.terminal import print_parts, print_reference
 from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ
 from orchestrator.linear.spectra.stability import Stability
 from orchestrator.output.report.colours import OF_VERDICTS
+from orchestrator.output.report.short_texts import LONGEST_REMARK
 from orchestrator.output.report.verdict_sentence import VerdictSentence
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.runs import tables
@@ -71,7 +72,8 @@ def print_answers(
     ranges = [r.hidden.frequency_range for r in results if r.hidden is not None]
     looked_at = ranges[0] if ranges else ELECTROMECHANICAL_HZ
     others = other_figures(results)
-    console.print(answers_table(answers, looked_at, others))
+    longest = LONGEST_REMARK if console.is_terminal else None  # who reads a file may want all of it
+    console.print(answers_table(answers, looked_at, others, longest=longest))
     if others.figures:
         print_reference(console, results)
     print_parts(console, map(escape, beside))

@@ -11,7 +11,7 @@ from orchestrator.cases.case import as_typed
 from orchestrator.core.options import Option
 from orchestrator.linear.spectra.modes import Mode, damping_percent
 from orchestrator.output.report.colours import OF_VERDICTS
-from orchestrator.output.report.short_texts import LONGEST_REMARK, short
+from orchestrator.output.report.short_texts import short
 from orchestrator.output.report.terminal_tables import make_table
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.runs.answer import ScenarioAnswer
@@ -46,7 +46,12 @@ def answers_table(
     answers: Sequence[ScenarioAnswer],
     frequency_range: tuple[float, float],
     others: OtherFigures | None = None,
+    *,
+    longest: int | None = None,
 ) -> Table:
+    """Return a row for each scenario's answer.
+
+    ``longest``: characters from which a remark is cut, as on a terminal; None where all of it is shown."""
     low, high = frequency_range
     others = others or OtherFigures()
     theirs = dict(enumerate(others.figures))
@@ -61,14 +66,18 @@ def answers_table(
         word = Text(answer.word, style=f"bold {OF_VERDICTS[answer.good]}")
         modes = [mode for mode in (answer.mode, answer.became) if mode]
         figures = _figures(modes, theirs.get(k))
-        table.add_row(answer.subject, word, *figures, short(answer.remark, LONGEST_REMARK))
+        table.add_row(answer.subject, word, *figures, _remark(answer.remark, longest))
         another = answer.another_after
         if another:
             which = "another mode" if answer.became else "not clearly the same mode"
             who = f": {answer.after_swing}" if answer.after_swing else ""
             remark = f"least damped after the events, {which}{who}"
-            table.add_row("", "", *_figures([another]), short(remark, LONGEST_REMARK))
+            table.add_row("", "", *_figures([another]), _remark(remark, longest))
     return table
+
+
+def _remark(text: str, longest: int | None) -> str:
+    return text if longest is None else short(text, longest)
 
 
 def _figures(modes: Sequence[Mode], theirs: tuple[float, float] | None = None) -> tuple[str, str]:

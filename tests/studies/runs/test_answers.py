@@ -1,6 +1,7 @@
 """What is read first: verdict and mode of each scenario, and the power flow beside pandapower's."""
 
 import csv
+import io
 import json
 from pathlib import Path
 from types import SimpleNamespace
@@ -8,9 +9,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
+from rich.console import Console
 
 from orchestrator.cases.form.schema import KindTable
 from orchestrator.face.cli import main
+from orchestrator.face.cli.verdict import print_answers
 from orchestrator.linear.spectra.modes import make_mode
 from orchestrator.linear.spectra.stability import Hidden, Stability
 from orchestrator.output.report.html.verdict_lines import VerdictLine
@@ -148,9 +151,23 @@ def test_a_long_remark_is_whole_in_json_and_short_in_the_table():
     assert len(answer.remark) > LONGEST_REMARK
     assert answer.as_json()["remark"] == answer.remark
     assert answer.remark.endswith("sg1 against sg2")
-    cut = str(next(iter(answers_table([answer], (0.1, 2.0)).columns[-1].cells)))
+    table = answers_table([answer], (0.1, 2.0), longest=LONGEST_REMARK)
+    cut = str(next(iter(table.columns[-1].cells)))
     assert cut.endswith(" …")
     assert answer.remark.startswith(cut.removesuffix(" …"))
+
+
+@pytest.mark.parametrize("on_terminal", [True, False])
+def test_a_remark_is_cut_on_a_terminal_and_whole_in_a_pipe(on_terminal):
+    acting = [finding("active_limit", what=f"limit of the current number {k}") for k in range(4)]
+    answer = of_run(result(acting))
+    console = Console(
+        width=160, record=True, file=io.StringIO(), force_terminal=on_terminal, no_color=True
+    )
+    print_answers(console, [answer], [result(acting).modes], (), details=False)
+    text = " ".join(console.export_text().replace("│", " ").split())
+    assert (answer.remark in text) is not on_terminal
+    assert ("…" in text) is on_terminal
 
 
 @pytest.mark.parametrize(
