@@ -17,6 +17,7 @@ from orchestrator.cases.networks.source_changes import Changes, Remark
 from orchestrator.core import foreign_files
 from orchestrator.core.errors import CaseError, InputError
 from orchestrator.core.foreign_files import check_regular, one_line, read_bytes, read_text, visible
+from orchestrator.core.question_kinds import by_kind
 from orchestrator.core.safe_files import file_hash
 from orchestrator.core.toml_files import read_toml
 from orchestrator.devices.fmi.vendor_files import as_fmu
@@ -273,6 +274,21 @@ def test_what_a_networks_source_calls_its_elements_is_shown_in_one_line():
     changes.note("L1\nUNSTABLE\x1b[2K", "held")
     (problem,) = changes.as_problems()
     assert str(problem) == "grid.zip, element L1\\nUNSTABLE\\x1b[2K: held"
+
+
+def test_a_question_about_many_records_names_the_first_of_them_and_its_details_all():
+    """A network of 240 buses had 133 line numbers in every answer and every refusal."""
+    changes = Changes("own.raw")
+    for line in range(1, 14):
+        changes.note(line, "held")
+    for line in range(1, 13):
+        changes.note(line, "left out")
+    many, few = changes.as_problems()
+    assert str(many) == f"own.raw, lines {', '.join(map(str, range(1, 14)))}: held"
+    lines = by_kind({str(many): many, str(few): few}, "gfor modes x --details")
+    short = "own.raw, lines 1, 2, 3, 4 and 9 more: held [gfor modes x --details lists all of them]"
+    assert [*lines.values()] == [short, str(few)]
+    assert [*by_kind({str(many): many}).values()] == [short.partition(" [")[0]]
 
 
 def test_changes_are_of_one_kind_by_what_is_said_of_them_and_not_by_their_figures():

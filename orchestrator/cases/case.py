@@ -410,7 +410,12 @@ def _besides(problems: Sequence[Problem], questions: Sequence[Problem]) -> list[
     for question in questions:
         by_text.setdefault(question.text, question)
     return [
-        Problem(by_text[first].place, f"questioned besides: {line}", kind, besides=True)
+        Problem(
+            by_text[first].place_in_short or by_text[first].place,
+            f"questioned besides: {line}",
+            kind,
+            besides=True,
+        )
         for first, line in by_kind(by_text).items()
     ]
 

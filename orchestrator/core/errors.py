@@ -192,6 +192,8 @@ class Problem:
     besides: bool = False  # a question that stands beside a failure, as its likely reason
     topic: QuestionTopic | None = None  # of a question that several elements can raise
     record: str = ""  # file and record that the text begins with, where ``place`` is the key that names the file
+    # the place with the first of many records that it lists, and how many more there are; "" where it lists few
+    place_in_short: str = ""
 
     @property
     def message(self) -> str:

@@ -29,8 +29,18 @@ def by_kind(questions: Mapping[str, Problem], command: str = "") -> dict[str, st
         kinds.setdefault(kind, []).append(text)
     lines = dict[str, str]()
     for texts in kinds.values():
-        lines.update(_lines({text: questions[text].topic for text in texts}, command))
+        of_kind = {text: questions[text].topic for text in texts}
+        for first, line in _lines(of_kind, command):
+            lines[first] = _with_short_place(line, questions[first], command)
     return lines
+
+
+def _with_short_place(line: str, question: Problem, command: str) -> str:
+    """Have a line name the first of many records that its question lists, and the command that lists all."""
+    if not question.place_in_short or question.place not in line:
+        return line
+    listed = f" [{command} lists all of them]" if command else ""
+    return line.replace(question.place, question.place_in_short, 1) + listed
 
 
 def _lines(topics: Mapping[str, QuestionTopic | None], command: str) -> Iterator[tuple[str, str]]:

@@ -3,8 +3,14 @@
 from collections import defaultdict
 from typing import Self
 
-from orchestrator.core.errors import Problem, QuestionTopic
+from orchestrator.core.errors import Problem, QuestionTopic, few
 from orchestrator.core.foreign_files import one_line
+
+_MOST_LISTED = 12
+"""Records of one text that a question lists in full: more fill a terminal, and hide what is said of them."""
+
+_SHOWN = 4
+"""Records that a question names where there are more than that; the others are counted."""
 
 
 class Remark(str):
@@ -52,10 +58,17 @@ class Changes:
                 f"{self._place}, {self._place_of(items)}",
                 text,
                 topic=QuestionTopic(kind_of(text)),
+                place_in_short=self._in_short(items),
             )
             for text, items in self._items.items()
         ]
 
-    def _place_of(self, items: list[int | str]) -> str:
+    def _place_of(self, items: list[int | str], most: int | None = None) -> str:
         plural = "s" if len(items) > 1 else ""
-        return f"{self._what}{plural} {', '.join(one_line(str(item)) for item in items)}"
+        names = [one_line(str(item)) for item in items]
+        return f"{self._what}{plural} {few(names, most or len(names))}"
+
+    def _in_short(self, items: list[int | str]) -> str:
+        if len(items) <= _MOST_LISTED:
+            return ""
+        return f"{self._place}, {self._place_of(items, _SHOWN)}"

@@ -405,9 +405,8 @@ def _cause(summary: Summary, item: ScreenedItem) -> str:
     """Why an item has no modes, without the questions that the base asks already."""
     text = item.record.text
     for question in summary.result.plan.prepared.questions:
-        text = text.replace(
-            f"; {Problem(question.place, f'questioned besides: {question.text}')}", ""
-        )
+        place = question.place_in_short or question.place
+        text = text.replace(f"; {Problem(place, f'questioned besides: {question.text}')}", "")
     return text
 
 
