@@ -78,9 +78,9 @@ def compare_with_file(
     Returns
     -------
     BesideFile
-        With a cause if the difference exceeds `CLOSE` beyond the file's digits: the buses at which the file's voltages
-        leave most power, or whose unit holds another voltage, or the stray capacitance of EMT models.  Which of them
-        moves the voltages how far is known from the linear power flow at the file's voltages."""
+        With a cause if the difference exceeds `CLOSE` beyond the file's digits: the bus at which the file's voltages
+        leave most apparent power, or whose unit holds another voltage, or the stray capacitance of EMT models.  Which
+        of them moves the voltages how far is known from the linear power flow at the file's voltages."""
     common = [bus for bus in flow.voltages if bus in file.at]
     if flow.slack not in common:
         return None
@@ -90,10 +90,10 @@ def compare_with_file(
     if difference <= CLOSE + file.rounding:
         return BesideFile(difference, bus)
     theirs = {x: turn * file.at[x] for x in common}
-    return BesideFile(difference, bus, _tell(flow, theirs, bus, {*held_devices}))
+    return BesideFile(difference, bus, _tell(flow, theirs, {*held_devices}))
 
 
-def _tell(flow: PowerFlow, theirs: Mapping[str, complex], worst: str, devices: set[str]) -> str:
+def _tell(flow: PowerFlow, theirs: Mapping[str, complex], devices: set[str]) -> str:
     """Return the causes that move the voltages most, in words."""
     equations = _equations(flow)
     stated = complete_voltages(equations, theirs)
@@ -110,9 +110,8 @@ def _tell(flow: PowerFlow, theirs: Mapping[str, complex], worst: str, devices: s
     left[equations.slack] = 0
     beyond = abs(ours) - abs(stated)
     beyond[free] = 0
-    weight = _effects(equations, stated, left, place[worst])
     moved = {
-        _tell_left(equations, left, weight, devices): _moved_by(equations, stated, left),
+        _tell_left(equations, left, devices): _moved_by(equations, stated, left),
         _tell_held(flow, equations, beyond): _moved_by_holding(equations, stated, beyond),
         "stray_B of EMT models, which the file does not have": _moved_by(equations, stated, stray),
     }
@@ -134,31 +133,12 @@ def _equations(flow: PowerFlow) -> FlowEquations:
     )
 
 
-def _effects(
-    equations: FlowEquations, stated: np.ndarray, left: np.ndarray, worst: int
-) -> np.ndarray:
-    """Return how far the power that is left at each bus moves the voltage of one bus [pu]."""
-    angle = np.concatenate([equations.angle_buses == worst, np.zeros(len(equations.free_buses))])
-    size = np.concatenate([np.zeros(len(equations.angle_buses)), equations.free_buses == worst])
-    transposed = equations.jacobian(stated).T.tocsc()
-    effects = np.zeros(len(left))
-    for moved in (x for x in (angle, size) if x.any()):
-        per_power = np.atleast_1d(spsolve(transposed, moved))
-        active, reactive = np.zeros(len(left)), np.zeros(len(left))
-        active[equations.angle_buses] = per_power[: len(equations.angle_buses)]
-        reactive[equations.free_buses] = per_power[len(equations.angle_buses) :]
-        effects = np.hypot(effects, active * left.real + reactive * left.imag)
-    return effects
-
-
-def _tell_left(
-    equations: FlowEquations, left: np.ndarray, effects: np.ndarray, devices: set[str]
-) -> str:
-    k = int(np.argmax(effects))
+def _tell_left(equations: FlowEquations, left: np.ndarray, devices: set[str]) -> str:
+    k = int(np.argmax(np.abs(left)))
     active, reactive = (
         round(float(SYSTEM_BASE_MVA * x), 3) + 0.0 for x in (left[k].real, left[k].imag)
     )
-    size = f"{active:+.3g} MW" + ("" if equations.held[k] else f" {reactive:+.3g} Mvar")
+    size = f"{active:+.4g} MW" + ("" if equations.held[k] else f" {reactive:+.4g} Mvar")
     bus = equations.buses[k]
     at = f"{size} at {bus}"
     if bus in devices:

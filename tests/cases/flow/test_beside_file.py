@@ -14,16 +14,16 @@ from orchestrator.cases.flow.power_flow import (
 STRAY = 0.05
 
 
-def flow(*, drawn=80.0, held=1.0, stray=0.0):
+def flow(*, drawn=80.0, held=1.0, fed=0.3, near=0.2, stray=0.0):
     """A ring of two sources and a load."""
     lines = [
         FlowLine("one", "source", "load", R=0.01, X=0.1, B=0.02),
         FlowLine("two", "load", "second", R=0.02, X=0.2, B=0.04),
-        FlowLine("three", "second", "source", R=0.02, X=0.2, B=0.04),
+        FlowLine("three", "second", "source", R=0.02, X=near, B=0.04),
     ]
     units = [
         FlowUnit("g1", "source", S_n=200.0, P_0=0.0, v_0=1.02),
-        FlowUnit("g2", "second", S_n=100.0, P_0=0.3, v_0=held),
+        FlowUnit("g2", "second", S_n=100.0, P_0=fed, v_0=held),
     ]
     return solve_power_flow(
         ["source", "load", "second"],
@@ -61,6 +61,14 @@ def test_the_cause_is_named_with_its_bus_and_size(other, words):
     assert words in found.cause
     assert "; and" not in found.cause
     assert found.bus in found.in_words
+
+
+def test_the_bus_with_the_most_apparent_power_is_named_whatever_moves_the_worst_voltage():
+    """A bus next to the source: its 20 MW move the load's voltage less than the 10 MW at the load itself."""
+    theirs = flow(drawn=90.0, fed=0.1, near=0.02)
+    found = compare_with_file(flow(near=0.02), of_file(theirs))
+    assert found.bus == "load"
+    assert "which leave +20 MW at second and less elsewhere" in found.cause
 
 
 def test_two_causes_of_like_effect_are_both_told():
