@@ -141,7 +141,7 @@ class SequenceAssembly:
         zero = self._zero_line(branch, line)
         self._add_line(self.zero, branch, zero.z, zero.b, closed, 1.0)
         for bus, y in ((branch.from_bus, zero.y_from), (branch.to_bus, zero.y_to)):
-            self.zero.add_to_earth(bus, y)
+            self.zero.add_shunt(bus, y)
 
     def _add_line(
         self,
@@ -159,9 +159,9 @@ class SequenceAssembly:
         for (bus, square), own, far in zip(ends, closed, reversed(closed), strict=True):
             if not own:
                 continue
-            network.add_to_earth(bus, half / square)
+            network.add_shunt(bus, half / square)
             if not far and half and not (is_changed and self.changed.at is not None):
-                network.add_to_earth(bus, 1 / (z + 1 / half) / square)
+                network.add_shunt(bus, 1 / (z + 1 / half) / square)
         if is_changed and self.changed.at is not None:
             self._add_split(network, branch, z, closed, ratio)
             return
@@ -260,7 +260,7 @@ class SequenceAssembly:
             (self.data.zero, self.zero),
         ):
             for bus in (bus for bus in known if bus in self.flow.voltages):
-                network.add_to_earth(bus, known[bus])
+                network.add_shunt(bus, known[bus])
 
     def _add_unit(self, name: str, bus: str, plan: ComponentPlan) -> None:
         external = external_impedance(plan)

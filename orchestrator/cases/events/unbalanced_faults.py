@@ -114,6 +114,7 @@ class _Solver:
                 negative, zero = (x.impedance(event.bus) for x in (found.negative, found.zero))
                 z = _met(event.kind, complex(event.R, event.X), negative, zero)
                 self._keep(event, event.bus, event.kind, (negative, zero, z), found)
+                self._ask_of_capacitances(event.bus, event.bus, event.kind, zero, found)
                 return replace(event, R=z.real, X=z.imag)
             case coupled.LineFault():
                 found = self._assembled(values, Changed(event.line, event.at), event.kind, FAULT)
@@ -121,6 +122,7 @@ class _Solver:
                 z = _met(event.kind, complex(event.R, event.X), negative, zero)
                 place = f"{event.line}, {100 * event.at:g} %"
                 self._keep(event, place, event.kind, (negative, zero, z), found)
+                self._ask_of_capacitances(place, FAULT, event.kind, zero, found)
                 return replace(event, R=z.real, X=z.imag)
             case coupled.PoleSwitching():
                 return self._open_pole(event, values)
@@ -184,8 +186,7 @@ class _Solver:
         """Return both networks, and keep what was taken by a default and counts at a place."""
         found = SequenceAssembly(self._draft, self._flow, dict(values), changed)
         self._turned += [name for name in found.turned if name not in self._turned]
-        near = {*found.zero.part_of(place)}
-        away = {port.name for port in found.network.ports if port.bus not in near}
+        away = _away(found, place)
         for key, all_names in found.assumed.items():
             names = [x for x in all_names if key != "machine_x0" or x not in away]
             if kind == "2-phase" and key not in _ONLY_NEGATIVE:
@@ -248,6 +249,28 @@ class _Solver:
             Problem(self._where, text, topic=QuestionTopic("a fault without a path"))
         )
 
+    def _ask_of_capacitances(
+        self, place: str, bus: str, kind: FaultKind, zero: complex, found: SequenceAssembly
+    ) -> None:
+        """Ask about a zero sequence that charging and capacitors alone lead to earth from a fault's bus."""
+        if kind == "2-phase" or not found.zero.is_capacitive(bus):
+            return
+        machines = {*found.assumed.get("machine_x0", ())} - _away(found, bus)
+        said = _EXAMPLES["machine_x0" if machines else "step_up"]
+        data = found.data.source
+        file = f"correct {data}" if data else "give a SEQ file"
+        text = (
+            f"only capacitances (charging of lines, capacitors) lead the zero sequence to earth from {place}, Z0 = "
+            f"{_words(zero)} pu on 100 MVA: a fault of kind {kind} draws no more than their current there, and "
+            "voltages may rise while it lasts, as in a network whose neutrals are not earthed; if neutrals are, say "
+            f'which, such as [network.sequences] {said} or a transformer\'s vector group, groups.NAME = "YNd", or {file}'
+        )
+        self._asked.append(
+            Problem(
+                self._where, text, topic=QuestionTopic("a fault with capacitances alone", place)
+            )
+        )
+
     def questions(self) -> Iterator[Problem]:
         """Yield what was taken by a default, a question for each key that says otherwise, and what draws no current."""
         yield from self._asked
@@ -266,6 +289,12 @@ class _Solver:
                 f"a SEQ file, or write [network.sequences] {said}"
             )
             yield Problem(self._where, text, topic=QuestionTopic(f"sequence data: {key}"))
+
+
+def _away(found: SequenceAssembly, place: str) -> set[str]:
+    """Return the units that no branch of the zero sequence joins with a place."""
+    near = {*found.zero.part_of(place)}
+    return {port.name for port in found.network.ports if port.bus not in near}
 
 
 def _met(kind: FaultKind, own: complex, negative: complex, zero: complex) -> complex:

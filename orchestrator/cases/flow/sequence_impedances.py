@@ -27,6 +27,7 @@ class SequenceNetwork:
     buses: list[str]
     _entries: dict[tuple[str, str], complex] = field(default_factory=dict)
     _earthed: set[str] = field(default_factory=set)
+    _led: set[str] = field(default_factory=set)  # earthed by more than a capacitance
     _ends: list[tuple[str, str]] = field(default_factory=list)
     _solved: dict[frozenset[str], tuple[dict[str, int], SuperLU]] = field(default_factory=dict)
 
@@ -39,6 +40,15 @@ class SequenceNetwork:
         if y:
             self._add(bus, bus, y)
             self._earthed.add(bus)
+            self._led.add(bus)
+
+    def add_shunt(self, bus: str, y: complex) -> None:
+        """Add a line's charging or a shunt [pu, 100 MVA], which may be a capacitance; 0 is none."""
+        if y.imag <= abs(y.real):
+            self.add_to_earth(bus, y)
+            return
+        self._add(bus, bus, y)
+        self._earthed.add(bus)
 
     def add_series(self, one: str, other: str, z: complex, ratio: complex = 1.0) -> None:
         """Add an impedance [pu, 100 MVA] between two buses, behind an ideal ratio at the first."""
@@ -80,6 +90,11 @@ class SequenceNetwork:
             return NO_PATH
         place, factors = self._factors(part)
         return complex(self._column(factors, place, {bus: 1.0})[place[bus]])
+
+    def is_capacitive(self, bus: str) -> bool:
+        """Return whether capacitances are all that leads from a bus to earth."""
+        part = {*self.part_of(bus)}
+        return bool(self._earthed & part) and not self._led & part
 
     def between(self, one: str, other: str) -> complex:
         """Return the impedance between two buses [pu, 100 MVA]; `NO_PATH` where nothing joins them, earth included."""

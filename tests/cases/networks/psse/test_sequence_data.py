@@ -234,6 +234,44 @@ def test_no_path_to_earth_means_no_current_and_is_told(prepared):
     assert found.in_words.endswith("meets an open circuit: no current flows there")
 
 
+@pytest.mark.parametrize(
+    "fault",
+    [
+        'bus = "bus_5"\nkind = "1-phase"',
+        'bus = "bus_5"\nkind = "2-phase-earth"',
+        'bus = "bus_5"\nduration = "10 ms"\n[[events]]\ntype = "line_fault"\ntime = "1.5 s"\n'
+        'line = "line_4_5"\nat = 0.3\nkind = "1-phase"',
+    ],
+    ids=["1-phase", "2-phase-earth", "along a line"],
+)
+def test_a_path_to_earth_of_capacitances_alone_is_told_with_what_earths_it(fault, prepared):
+    words = "only capacitances (charging of lines, capacitors) lead the zero sequence to earth from"
+    not_earthed = '[network.sequences]\nstep_up = "Yd"'
+    ready = prepared(fault=fault, more=not_earthed)
+    assert ready.faults[0].zero.imag < 0
+    (text,) = told(ready, words)
+    assert 'such as [network.sequences] step_up = "YNd"' in text
+    assert "or give a SEQ file" in text
+    assert not told(prepared(fault=fault, more=not_earthed.replace("Yd", "YNd")), words)
+
+
+def test_capacitances_alone_do_not_matter_between_two_phases_and_a_file_is_named(prepared):
+    words = "only capacitances"
+    turned = [x.replace(",12,", ",13,") for x in transformers(True)]
+    text = seq(of_transformers=turned)
+    assert not told(prepared(text, fault='bus = "bus_5"\nkind = "2-phase"'), words)
+    (asked,) = told(prepared(text), words)
+    assert "or correct " in asked
+    assert asked.endswith("grid.seq")
+
+
+def test_a_machine_whose_neutral_is_to_earth_ends_the_question_of_capacitances(prepared):
+    through = '[network.sequences]\nstep_up = "YNyn"'
+    (asked,) = told(prepared(more=through), "only capacitances")
+    assert "such as [network.sequences] machine_x0 = 0.1" in asked
+    assert not told(prepared(more=f"{through}\nmachine_x0 = 0.1"), "only capacitances")
+
+
 def seq_with(change, text=None):
     old, new = change
     text = seq() if text is None else text
