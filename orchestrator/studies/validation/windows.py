@@ -15,6 +15,8 @@ from orchestrator.studies.validation.record import Recording
 _LAG = 0.02  # time [s] over which a change of the voltage counts as abrupt: a period
 _AS_USUAL = 2.0  # times the largest change in the first part, up to which a change is as before
 _LEAST = 0.002  # smallest change of the voltage [pu] over that time which is an event
+_LEAST_IN_QUIET = 5e-4  # the same, where nothing in the recording changes much more [pu]
+_OF_LARGEST = 0.25  # part of the recording's largest change, from which on one is the event
 _ABOVE = 4.0  # times the largest change in the first part, from which on it is an event
 _FIRST = 0.1  # part of the recording that is looked at for what is usual before the event
 _LONGEST_FIRST = 1.0  # [s]
@@ -121,11 +123,18 @@ def _event(recording: Recording, still: Complex, first: int) -> tuple[float, flo
         return None
     change = np.abs(still[lag:] - still[:-lag])
     usual = float(change[: max(1, first - lag)].max())
-    abrupt = np.flatnonzero(change > max(_ABOVE * usual, _LEAST))
+    abrupt = np.flatnonzero(change > max(_ABOVE * usual, _least_change(change)))
     if not len(abrupt):
         return None
     earliest = max(0, int(abrupt[0]) + lag - round(_BACK / recording.interval))
     return _begin_and_end(recording, still, earliest, int(abrupt[0]) + lag, usual)
+
+
+def _least_change(change: Numbers) -> float:
+    """The smallest change over the lag that is an event: a small one is, where none is much larger.
+
+    Without that, the event of a switched load would begin where the swing after it is fastest."""
+    return float(np.clip(_OF_LARGEST * change.max(), _LEAST_IN_QUIET, _LEAST))
 
 
 def _early_event(

@@ -69,6 +69,33 @@ def test_a_swing_has_no_early_event_wherever_it_begins(hertz, phase):
     assert not found.seen or found.begin > 0.1 * LENGTH - 0.05
 
 
+def switched(at, jump, swing):
+    """A load is switched: the magnitude jumps, and the angle begins to swing."""
+
+    def voltage(times):
+        since = np.clip(times - at, 0, None)
+        angle = swing * (1 - np.cos(2 * np.pi * 0.5 * since))
+        return (1 - jump * (since > 1e-9)) * np.exp(-1j * angle)
+
+    return voltage
+
+
+@pytest.mark.parametrize("interval", [1e-3, 5e-3, 0.02])
+@pytest.mark.parametrize("jump", [0.0008, 0.0015, 0.005])
+def test_a_small_jump_is_the_event_and_not_the_faster_swing_after_it(jump, interval):
+    """The swing's angle moves by up to 0.0025 pu in a period, more than most of these jumps."""
+    found = windows(switched(1.5, jump, 0.04), interval)
+    assert found.begin == pytest.approx(1.5, abs=1.1 * interval)
+
+
+def test_a_load_that_is_switched_before_a_fault_is_not_the_event():
+    def voltage(times):
+        return (1 - 0.001 * (times >= 1.5)) * dip(3.0)(times)
+
+    found = windows(voltage)
+    assert found.begin == pytest.approx(3.0, abs=2e-3)
+
+
 def test_noise_alone_has_no_event():
     assert not windows(lambda times: np.ones(len(times), complex), noise=3e-3).seen
 
