@@ -31,6 +31,7 @@ from orchestrator.cases.networks.psse.dyr_units import (
     completed,
     missing_records,
     named_by_bus,
+    refuse_exciters_without_field,
     rows_of_machines,
     with_choices,
     with_infinite_buses,
@@ -315,6 +316,7 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> tuple[list[UnitRow], Sequen
             idle,
             approximate=table.dyr_approximate,
         )
+        refuse_exciters_without_field(rows, machines, records, replaced)
     if draft.data is not None:
         rows = with_known_buses(rows, draft.data.merged, draft.data.buses)
     motors = _account(draft, table, records, ours, refusals)

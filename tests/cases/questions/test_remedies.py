@@ -180,6 +180,18 @@ GALLERY = {
         re.sub(rf"(?m)^2,'GENROU'.*\n|^{GENCLS}\n", "", DYR),
         undo=(('replace = ["2", "3"]', ""),),
     ),
+    "exciter of a classical machine": Broken(
+        "a constant emf without a field winding", NINE, DYR + SEXS.replace("2 'SEXS'", "3 'SEXS'")
+    ),
+    "exciters of classical machines alone": Broken(
+        "(and 1 more exciter)",
+        NINE,
+        re.sub(r"(?m)^[12].*GENROU.*\n(  .*\n)?", "1 'GENCLS' 1 3 0 /\n", DYR).replace(
+            "1 'GENCLS' 1 3 0 /\n1", "1 'GENCLS' 1 3 0 /\n2"
+        )
+        + SEXS,
+    ),
+    "second machine of another model": Broken("a second machine of", NINE, f"{DYR}{GENROU}\n"),
     "converter that is not known": Broken(
         "a grid-following converter", NINE, changed(DYR, (GENCLS, "3 'WT4G1' 1 0 /"))
     ),

@@ -147,7 +147,7 @@ def _refuse_what_lacks(
     listed = first_of(counted_once, _MOST_SHOWN, ("gfor new lists all with " + Option.DETAILS))
     shown = [*in_words(missing, found.labels), *listed]
     remedy = "correct them"
-    if problems or any(model.may_go for model in missing):
+    if found.may_go or any(model.may_go for model in missing):
         option = command("new", (Option.DYR_LEAVE_OUT, "MODEL"))
         remedy += f", or name models that may go in [units] dyr_leave_out ({option})"
     raise InputError(f"the dynamics data cannot be taken over; {remedy}:\n  " + "\n  ".join(shown))

@@ -12,6 +12,7 @@ from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.dyr_unit_records import RECORDS_OF_UNITS
 from orchestrator.cases.networks.psse.machine_model import ON_SHAFT
 from orchestrator.cases.networks.unit_row import DoubtOfRecord
+from orchestrator.core.errors import number_of
 
 _LIMITERS = ("oel", "uel")
 _OF_CONTROLS = ("exciter", "governor", "stabilizer", "compensator", *_LIMITERS)
@@ -69,5 +70,5 @@ def doubt_of_count(record: DynamicRecord) -> DoubtOfRecord | None:
         count = needed - record.lacking
         names = ", ".join(field.name for field in known.fields[count:])
         taken = f"the others ({names}) are taken as 0, as in GridPACK"
-    text = f"{record.name} has {count} values, and needs {needed}: {taken}; correct the record"
+    text = f"{record.name} has {number_of(count, 'value')}, and needs {needed}: {taken}; correct the record"
     return DoubtOfRecord(known.kind, record.place, text, f"a number of values of {record.name}")

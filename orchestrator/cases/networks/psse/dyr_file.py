@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fmus.toolchain.dyr_form import DyrField
-from orchestrator.core.errors import InputError
+from orchestrator.core.errors import InputError, number_of
 from orchestrator.core.foreign_files import read_text, visible
 from orchestrator.core.units import LARGEST
 
@@ -154,20 +154,40 @@ def _behind_counts(values: tuple[str, ...]) -> tuple[str, ...]:
     return rest if is_whole else values
 
 
-def given_values(
-    record: DynamicRecord, fields: Sequence[DyrField], known: Collection[str]
-) -> dict[str, float]:
-    following = next((text for text in record.values[2:] if text.upper() in known), None)
+def swallowed_machines(record: DynamicRecord, known: Collection[str]) -> list[tuple[int, str]]:
+    """Return bus and identifier of the machines whose records follow one without a slash, and are lost in it.
+
+    ``known``: names of models."""
+    triples = zip(record.values, record.values[1:], record.values[2:], strict=False)
+    return [
+        (int(bus), machine)
+        for bus, name, machine in triples
+        if name.upper() in known and bus.isdigit()
+    ]
+
+
+def refuse_next(record: DynamicRecord, known: Collection[str]) -> None:
+    """Refuse a record that runs into the next one; ``known``: names of models."""
+    following = next((text for text in record.values[1:] if text.upper() in known), None)
     if following:
         raise InputError.at(
             record.place,
             f"the record {record.name} has no slash at its end, and runs into the next, "
-            f"{following}",
+            f"{following}; write the slash",
         )
+
+
+def given_values(
+    record: DynamicRecord, fields: Sequence[DyrField], known: Collection[str]
+) -> dict[str, float]:
+    """Return the numbers of a record by the names of its fields.
+
+    ``known``: names of models, which stand among its values where it has no slash at its end."""
+    refuse_next(record, known)
     if len(record.values) != len(fields):
         raise InputError.at(
             record.place,
-            f"{record.name} has {len(record.values)} values, and needs {len(fields)}: "
+            f"{record.name} has {number_of(len(record.values), 'value')}, and needs {len(fields)}: "
             f"{', '.join(field.name for field in fields)}",
         )
     return {

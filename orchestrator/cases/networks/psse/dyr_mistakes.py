@@ -18,7 +18,7 @@ from orchestrator.cases.networks.psse.machine_model import (
     OF_PLANTS,
     ON_SHAFT,
 )
-from orchestrator.core.errors import few
+from orchestrator.core.errors import InputError, few, number_of
 
 OF_NO_ORDER = dict.fromkeys(("REGFM_C1", "REGFMC1", "REGFMC1U"), "regfm_c1_phasor")
 """Models of converters whose records cannot be read, as nobody tells the order of their fields, and what they are
@@ -134,6 +134,29 @@ def going_with_shafts(
 def _converters_of_plants() -> set[str]:
     """Parts of the records of converters that need a control."""
     return {record.part for record in PLANT_RECORDS.values() if record.kind == "converter"}
+
+
+def exciter_without_field(
+    exciters: Sequence[DynamicRecord], records: Sequence[DynamicRecord]
+) -> InputError:
+    """Return the error of exciters at classical machines.
+
+    ``records``: of all machines: a model that none of the others has goes by its name alone."""
+    first, *others = exciters
+    elsewhere = {one.name for one in records if one not in exciters}
+    names = [
+        f"{one.name} at {one.bus}" if one.name in elsewhere or not others else one.name
+        for one in exciters
+    ]
+    more = f" (and {number_of(len(others), 'more exciter')})" if others else ""
+    leaving_out = without_models([*dict.fromkeys(names)])
+    return InputError.at(
+        first.place,
+        f"{first.name} of machine {first.machine!r} at bus {first.bus}{more} acts on nothing: the machine's record is "
+        "GENCLS, a constant emf without a field winding, which takes no field voltage in PSS/E either (OpenIPSL's "
+        "GENCLS, verified against PSS/E, has no such input); give the machine a record with a field winding, such as "
+        f"GENSAL or GENROU, remove the exciter's, or write {leaving_out}",
+    )
 
 
 def without_machine(

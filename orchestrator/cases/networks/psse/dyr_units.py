@@ -5,11 +5,12 @@ Parts of machines without a record are what [units] chooses for them, else what 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from fmus.synchronous_generator.dyr_records import MACHINE_VARIANTS
+from fmus.synchronous_generator.dyr_records import DYR_RECORDS, MACHINE_VARIANTS
 from orchestrator.cases.form.unusual_value import UnusualValue
 from orchestrator.cases.networks.data import bus_name
 from orchestrator.cases.networks.psse.dyr import machine_models
 from orchestrator.cases.networks.psse.dyr_file import OF_FACTS, DynamicRecord
+from orchestrator.cases.networks.psse.dyr_mistakes import exciter_without_field
 from orchestrator.cases.networks.psse.dyr_unit_records import COMPENSATORS
 from orchestrator.cases.networks.psse.limiter_records import LIMITERS
 from orchestrator.cases.networks.psse.machine_model import (
@@ -37,6 +38,32 @@ _IDLE = {"stabiliser": ("pss",), "limiter": LIMITERS}
 _CONSTANT = {"exciter": "field voltage", "governor": "mechanical power"}
 _OTHERS = 2  # machines with a record from which on a machine without one is questioned
 _CONDENSER = 0.01  # active power [pu of the rating] below which a machine needs no governor
+
+
+def refuse_exciters_without_field(
+    rows: Sequence[UnitRow],
+    machines: Sequence[Machine],
+    records: Sequence[DynamicRecord],
+    without: Collection[str],
+) -> None:
+    """Refuse records of exciters at classical machines, all together.
+
+    ``rows``: with what the records say; ``without``: labels of units that a converter replaces."""
+    classical = {
+        (machine.bus, machine.name.strip())
+        for machine, row in zip(machines, rows, strict=True)
+        if row.parts.get("machine") == CLASSICAL
+        and row.parts.get("exciter", MANUAL) != MANUAL
+        and row.label not in without
+    }
+    known = [one for one in records if one.name in DYR_RECORDS]
+    exciters = [
+        one
+        for one in known
+        if (one.bus, one.machine) in classical and DYR_RECORDS[one.name].kind == "exciter"
+    ]
+    if exciters:
+        raise exciter_without_field(exciters, known)
 
 
 def with_choices(

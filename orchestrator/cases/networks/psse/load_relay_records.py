@@ -18,7 +18,7 @@ from orchestrator.cases.networks.psse.load_records import records_for
 from orchestrator.cases.networks.psse.raw_network import FileLoad
 from orchestrator.cases.networks.psse.refusals import Refusals
 from orchestrator.cases.networks.psse.relay_records import check_times, numbers_of
-from orchestrator.core.errors import InputError
+from orchestrator.core.errors import InputError, number_of
 from orchestrator.systems.coupling.relay_limits import Quantity, RelayLimits
 
 _SUBSYSTEMS = ("BL", "OW", "ZN", "AR", "AL")  # the narrower first
@@ -132,7 +132,7 @@ def _stages(record: DynamicRecord, load: FileLoad, form: LoadRelayForm) -> Itera
     if not names_bus and len(texts) != form.count:
         raise InputError.at(
             record.place,
-            f"{record.name} has {len(texts)} values, and needs {form.count}: {form.in_words}; "
+            f"{record.name} has {number_of(len(texts), 'value')}, and needs {form.count}: {form.in_words}; "
             f"a relay that is not wanted goes with dyr_leave_out = ['{record.name}'] in [units]",
         )
     watched = load.bus

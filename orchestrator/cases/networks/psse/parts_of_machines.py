@@ -4,7 +4,12 @@ from collections.abc import Collection, Sequence
 
 from fmus.grid_following.dyr_approximation import FIELDS
 from fmus.toolchain.dyr_form import DyrRecord
-from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
+from orchestrator.cases.form.remedies import without_models
+from orchestrator.cases.networks.psse.dyr_file import (
+    DynamicRecord,
+    refuse_next,
+    swallowed_machines,
+)
 from orchestrator.cases.networks.psse.dyr_mistakes import remedy_for
 from orchestrator.cases.networks.psse.dyr_unit_records import RECORDS_OF_UNITS
 from orchestrator.cases.networks.psse.dyr_values import values_of_record
@@ -17,6 +22,12 @@ from orchestrator.cases.networks.psse.missing_models import kind_of
 from orchestrator.cases.networks.psse.raw_network import Machine, unit_labels
 from orchestrator.core.errors import InputError
 
+_MODELS = {*RECORDS_OF_UNITS, *FIELDS}
+"""Names of the models that a record without a slash may run into."""
+
+_NEEDED = ("machine", "converter", "electrical")
+"""Kinds of records that a machine or a converter cannot do without."""
+
 MachineKey = tuple[int, str]
 """Bus and identifier of a machine."""
 
@@ -27,7 +38,8 @@ class PartsOfMachines:
     ``parts``, ``names``: our part and PSS/E's record by the kind of part. ``values``, ``lines``: of parameters.
     ``records``: of each machine, all of them. ``problems``: in the order of the file. ``first_places``: of the first
     record, by the problem. ``without``: names of converters' records, which have a remedy of their own. ``lacking``:
-    machines whose own record no part stands for. ``unread``: records whose values are wrong."""
+    machines whose own record no part stands for, or is lost in another without a slash. ``unread``: records whose
+    values are wrong. ``may_go``: whether a record that is in the way may be left out."""
 
     def __init__(
         self, machines: Sequence[Machine], left: Collection[str], *, approximate: bool
@@ -46,10 +58,12 @@ class PartsOfMachines:
         self.without: set[str] = set()
         self.lacking: set[MachineKey] = set()
         self.unread: list[DynamicRecord] = []
+        self.may_go = False
 
     def take(self, record: DynamicRecord) -> None:
         """Take a record of a machine in service; others, and models that are left out, set nothing."""
         key = (record.bus, record.machine)
+        self._note_swallowed(record)
         if key not in self.machines:
             return
         self.records[key].append(record)
@@ -60,11 +74,33 @@ class PartsOfMachines:
         if known is None:
             self._note_unknown(record, key)
         elif known.kind in self.parts[key]:
-            self.problems.append(
-                f"{record.place}: a second {known.kind} of machine {record.machine!r} at bus {record.bus}"
-            )
+            self._note_second(record, key, known.kind)
         else:
             self._set_part(record, key, known)
+
+    def _note_swallowed(self, record: DynamicRecord) -> None:
+        """Note a record in which those of machines in service are lost, whatever else becomes of it."""
+        lost = {*swallowed_machines(record, _MODELS)} & {*self.machines}
+        self.lacking |= lost
+        try:
+            refuse_next(record, _MODELS if lost else ())
+        except InputError as error:
+            self.problems.append(str(error))
+
+    def _note_second(self, record: DynamicRecord, key: MachineKey, kind: str) -> None:
+        """Note a record of a kind that the machine has one of already; one of another model may be left out."""
+        name = self.names[key][kind]
+        first = next(one for one in self.records[key] if one.name == name)
+        problem = (
+            f"{record.place}: a second {kind} of machine {record.machine!r} at bus {record.bus}; the first is {name} "
+            f"in line {first.line}; remove one"
+        )
+        is_alone = self.labels[key] == str(
+            record.bus
+        )  # at its bus: a name with the bus is of its record only
+        if record.name != name and is_alone:
+            problem += f", or write {without_models([f'{record.name} at {record.bus}'])}"
+        self.problems.append(problem)
 
     def _note_unknown(self, record: DynamicRecord, key: MachineKey) -> None:
         """Note a record that no part stands for, where it has a remedy of its own."""
@@ -86,6 +122,7 @@ class PartsOfMachines:
         except InputError as error:
             self.problems.append(str(error))
             self.unread.append(record)
+            self.may_go |= known.kind not in _NEEDED
             return
         self.values[key] |= own
         self.lines[key] |= dict.fromkeys(own, record.line)

@@ -135,7 +135,7 @@ def test_records_over_lines_with_commas_or_blanks(tmp_path):
         ),
         ("3 'GENCLS'", "8 'GENCLS'", r"machine '1' at bus 3 has no record of a machine"),
         ("9.55", "x", r"line 2: GENROU has H = 'x'; it must be a number"),
-        ("2.35 0.0 /", "2.35 /", r"line 5: GENCLS has 1 values, and needs 2: H, D"),
+        ("2.35 0.0 /", "2.35 /", r"line 5: GENCLS has 1 value, and needs 2: H, D"),
         ("7.0 0.0 /", "7.0 0.0", r"grid.dyr, line 7: the record does not end with a slash"),
         ("3 'GENCLS'", "three 'GENCLS'", r"line 5: .* is no record; one is bus 'MODEL' id values"),
         ("3 'GENCLS' 1  2.35 0.0", "3 'TGOV1' 1", r"line 5: TGOV1 has 0 values, and needs 7: R, "),
@@ -144,13 +144,70 @@ def test_records_over_lines_with_commas_or_blanks(tmp_path):
             "2.35 0.0",
             r"line 5: the record GENCLS has no slash at its end, and runs into the next, SEXS",
         ),
-        ("1 'TGOV1'", "1 'SEXS'", r"line 7: a second exciter of machine '1' at bus 1"),
+        (
+            "1 'TGOV1'",
+            "1 'SEXS'",
+            r"line 7: a second exciter of machine '1' at bus 1; the first is SEXS in line 6; remove",
+        ),
     ],
 )
 def test_what_cannot_be_taken_over(old, new, words, tables):
     assert old in DYR
     with pytest.raises((CaseError, InputError), match=words):
         tables(DYR.replace(old, new, 1))
+
+
+SEXS_AT_3 = "3 'SEXS' 1  0.1 10.0 100.0 0.05 -5.0 5.0 /\n"
+UNFINISHED = ("0.08 0.0 0.0 / hydro in the book", "0.08 0.0 0.0")
+"""The end of the first record, and the same without its slash."""
+
+
+def problems_of(tables, dyr, case=CASE):
+    with pytest.raises(CaseError) as refused:
+        tables(dyr, case)
+    return [str(problem) for problem in refused.value.problems]
+
+
+def test_a_record_that_is_lost_in_another_does_not_lack(tables):
+    """Machine 2 has a record, behind that of machine 1, whose slash is forgotten."""
+    (said,) = problems_of(tables, DYR.replace(*UNFINISHED))
+    assert (
+        "line 2: the record GENROU has no slash at its end, and runs into the next, GENROU" in said
+    )
+    assert "has no record of a machine" not in said
+
+
+def test_a_record_that_is_lost_in_one_left_out_is_told(tables):
+    """Else its machine would silently be none."""
+    gencls, sexs = (line for line in DYR.splitlines() if "GENCLS" in line or "SEXS" in line)
+    dyr = DYR.replace(f"{gencls}\n", "").replace(sexs, f"{sexs[:-1]}\n{gencls}")
+    case = CASE.replace("[units]", '[units]\ndyr_leave_out = ["SEXS"]')
+    (said,) = problems_of(tables, dyr, case)
+    assert "the record SEXS has no slash at its end, and runs into the next, GENCLS" in said
+
+
+@pytest.mark.parametrize(("wrong", "helps"), [("0.1 10.0 100.0", True), ("9.55", False)])
+def test_leaving_a_model_out_is_named_only_where_it_helps(wrong, helps, tables):
+    """An exciter may go, and a machine's own record may not."""
+    (said,) = problems_of(tables, DYR.replace(wrong, f"x{wrong}"))
+    assert ("name models that may go" in said) is helps
+
+
+def test_an_exciter_of_a_classical_machine_is_one_problem_at_its_line(tables):
+    (said,) = problems_of(tables, DYR + SEXS_AT_3)
+    assert "grid.dyr, line 8: SEXS of machine '1' at bus 3 acts on nothing" in said
+    assert """(`gfor new --dyr-leave-out "SEXS at 3"`)""" in said
+
+
+def test_an_exciter_of_a_classical_machine_goes_at_the_users_word(tables):
+    case = CASE.replace("[units]", '[units]\ndyr_leave_out = ["SEXS at 3"]')
+    found = tables(DYR + SEXS_AT_3, case)
+    assert (found["sg1"].exciter, found["sg3"].exciter) == ("sexs", "manual")
+
+
+def test_a_classical_machine_that_a_converter_replaces_may_have_an_exciter(tables):
+    case = CASE.replace("[units]", '[units]\nreplace = ["3"]')
+    assert "sg3" not in tables(DYR + SEXS_AT_3, case)
 
 
 def test_a_model_goes_at_the_users_word(tables):

@@ -143,6 +143,10 @@ def test_a_plant_controller_that_is_left_out_is_said(prepared):
             dyr(plant=record("REGCA1", REGCA1)),
             r"line 7: a second converter of machine '1' at bus 3",
         ),
+        (
+            dyr().replace(" /\n3 'REECB1'", "\n3 'REECB1'"),
+            r"be taken over; correct them:\n  \S+, line \d+: the record REGCA1 has no slash[^\n]*$",
+        ),
         (dyr(plant=record("REECA1", {})), r"line 7: a second electrical of machine '1' at bus 3"),
         (
             dyr(BUSR=2),
