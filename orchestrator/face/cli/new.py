@@ -14,14 +14,28 @@ from orchestrator.cases.networks.record_use import as_json, in_full
 from orchestrator.cases.new.network_files import sources_of
 from orchestrator.cases.new.new_case import write_case
 from orchestrator.cases.new.wanted_case import WantedCase, read_converter
+from orchestrator.cases.new.widened_limits import limits_to_widen
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.scenario.region_totals import RegionTotal, region_totals
-from orchestrator.core.errors import CaseError, InputError, Problem, ResultsError, listing_all
+from orchestrator.core.errors import (
+    CaseError,
+    InputError,
+    Problem,
+    ResultsError,
+    StartError,
+    listing_all,
+)
+from orchestrator.core.options import Option, command
 from orchestrator.core.safe_files import write_text
+from orchestrator.core.spelling import Text
 from orchestrator.devices.fmi.vendor_files import is_vendor_file
 from orchestrator.face.cli.arguments import add_options
 from orchestrator.face.cli.terminal import make_console, print_json, print_parts
 from orchestrator.output.report.short_texts import first_few
 from orchestrator.output.report.terminal_tables import PlainTable, make_table
+
+_MOST_TYPED = 8
+"""So many values stand in a command that is to be typed; more are a matter of the file."""
 
 _EXAMPLE = 'gfor new own.raw own.dyr --converter "bus 9, 300 MVA, 200 MW, less sg3" --out case.toml'
 
@@ -49,9 +63,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _written(options: argparse.Namespace) -> int:
-    from orchestrator.cases.scenario.service import in_service  # noqa: PLC0415 - these import what a run needs
-    from orchestrator.studies.modes.modes import running  # noqa: PLC0415
-
     if options.models is True:
         if options.files:
             raise InputError(
@@ -86,7 +97,7 @@ def _written(options: argparse.Namespace) -> int:
         print_parts(console, [_table_of_regions(regions)])
     for prepared in made.scenarios:
         if prepared.name in ("base", "converter"):
-            running(in_service(prepared)).close()  # what cannot start is told at once
+            _start(prepared, wanted)  # what cannot start is told at once
     console.print(
         escape(f"Next: gfor modes {wanted.out}{' --black-box' * made.black_box}"), highlight=False
     )
@@ -105,6 +116,40 @@ def _written(options: argparse.Namespace) -> int:
             }
         )
     return 0
+
+
+def _start(prepared: PreparedScenario, wanted: WantedCase) -> None:
+    """Start the machines of a scenario of the case that is written; the error of what cannot says what to type."""
+    from orchestrator.cases.scenario.service import in_service  # noqa: PLC0415 - these import what a run needs
+    from orchestrator.studies.modes.modes import running  # noqa: PLC0415
+
+    try:
+        running(in_service(prepared)).close()
+    except StartError as error:
+        first, *others = error.problems
+        written = Problem(str(wanted.out), _after_refusal(prepared, wanted), first.kind)
+        raise StartError(
+            prepared.case.source, first, error.component, [*others, written]
+        ) from error
+
+
+def _after_refusal(prepared: PreparedScenario, wanted: WantedCase) -> Text:
+    """Return what to do with a case that is written and cannot start, as it is typed."""
+    text = Text("it is written all the same, to be corrected there")
+    limits = limits_to_widen(prepared)
+    if not limits:
+        return text
+    if len(limits) <= _MOST_TYPED:
+        values = [(Option.SET, f"{limit.name}={limit.taken:g}") for limit in limits]
+        text += "; it starts with " + command(f"modes {shlex.quote(str(wanted.out))}", *values)
+    if not wanted.widen_limits:
+        text += (
+            "; to have these limits widened, and asked about, write it again with "
+            + Option.FORCE
+            + " and without "
+            + Option.NO_WIDENED_LIMITS
+        )
+    return text
 
 
 def _table_of_regions(regions: Sequence[RegionTotal]) -> PlainTable:

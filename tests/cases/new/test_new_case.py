@@ -3,6 +3,7 @@
 import io
 import json
 import re
+import shlex
 import sys
 import tomllib
 from dataclasses import replace
@@ -21,7 +22,7 @@ from orchestrator.core.errors import CaseError, InputError
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.linear.spectra.continuation import ModesMeetError
 from orchestrator.studies.modes import beside
-from orchestrator.studies.modes.modes import compute_modes
+from orchestrator.studies.modes.modes import compute_modes, running
 from tests.cases.networks.psse import raw, records
 from tests.cases.networks.psse.test_solution import solved_records
 from tests.cases.networks.test_network_sources import solved
@@ -203,6 +204,23 @@ def test_a_case_that_cannot_start_is_said_at_once(gfor, files):
     )
     assert "Next:" not in out
     assert (files[0].parent / "case.toml").exists()
+
+
+def test_what_a_case_that_cannot_start_names_works_as_it_is_typed(gfor, files):
+    """Its values at `gfor modes`, whose option they are; and the case written again, with its limits widened."""
+    five_machines(files[0].parent, highest=0.3)
+    out = files[0].parent / "case.toml"
+    code, _, err = gfor(*files, "--no-widened-limits", "--out", out)
+    assert code == 2
+    (said,) = (line for line in err.splitlines() if "it is written all the same" in line)
+    assert said.startswith(f"  - {out}: ")
+    typed = shlex.split(re.findall("`gfor modes ([^`]+)`", said)[0])
+    assert typed[0] == str(out)
+    assert typed[1::2] == ["--set"] * 4
+    with running(prepare_one(out, "base", dict(word.split("=") for word in typed[2::2]))):
+        pass
+    assert said.endswith("write it again with --force and without --no-widened-limits")
+    assert gfor(*files, "--force", "--out", out)[0] == 0
 
 
 def test_limits_of_reactive_power_are_kept_where_asked(gfor, files):
