@@ -26,6 +26,7 @@ from fmus.synchronous_generator.excitation.two_limits import bbsex1
 from fmus.synchronous_generator.excitation.without_regulator import external, manual
 from fmus.synchronous_generator.limiters.common import Limiter, Limiters
 from fmus.synchronous_generator.limiters.oel2c import oel2c
+from fmus.synchronous_generator.limiters.oel3c import oel3c
 from fmus.synchronous_generator.limiters.overexcitation import maxex1, maxex2
 from fmus.synchronous_generator.limiters.uel2c import uel2, uel2c
 from fmus.synchronous_generator.limiters.underexcitation import mnlex2, uel1
@@ -154,6 +155,7 @@ OELS: dict[str, Limiter | None] = {
     "maxex1": maxex1,
     "maxex2": maxex2,
     "oel2c": oel2c,
+    "oel3c": oel3c,
 }
 UELS: dict[str, Limiter | None] = {
     NONE: None,

@@ -16,7 +16,7 @@ from fmus.synchronous_generator.excitation.common import (
     Gate,
     Regulated,
 )
-from fmus.toolchain.blocks import RETURN_TIME
+from fmus.toolchain.blocks import BYPASS_TIME, RETURN_TIME
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and, logic_or
 
@@ -27,6 +27,8 @@ _ONE = 0.5  # above which a condition of 0 or 1 holds
 
 _HEADROOM = 1e-3
 """By which an operating point beyond a limiter's edge lies within the edge that is taken [pu, S_n]: enough for rest."""
+
+_ALLOWED = 1.01  # of an operating point beyond a limit, which may last: further than rounding
 
 LEAST = 1e-6
 """Signal [pu, S_n] from which a limiter acts: far below what moves a voltage, far above rounding."""
@@ -93,6 +95,29 @@ def moved_edge(m: ModelBuilder, excess_0: Expr, integrates: Expr) -> Expr:
         "By how much its edge is moved, so that it rests at the operating point",
         base="S_n",
     )
+
+
+def limit_that_rests(limit: Expr, at_start: Expr) -> Expr:
+    """Return the limit, or what is taken in its place where the operating point is beyond it, so that it rests."""
+    return if_else(at_start >= limit, _ALLOWED * at_start, limit)
+
+
+def sensed_field(
+    m: ModelBuilder, seen: Regulated, of_current: Expr, scale: Expr, lag: Expr
+) -> tuple[Expr, Callable[[Expr], None]]:
+    """Declare the measured field voltage or current and return it, with what gives it the field voltage.
+
+    ``of_current``: whether it is the current; ``scale``: by which it is multiplied; ``lag`` [s]: at 0 the current
+    passes, and the voltage keeps a lag of `BYPASS_TIME`, as it is known after the exciter alone."""
+    start = scale * seen.start.E_fd
+    sensed = m.state("sensed", start, "1", "Sensed field voltage or current")
+    passes = logic_and(of_current, lag <= 0)
+
+    def close(E_fd: Expr) -> None:
+        u = scale * if_else(of_current, seen.I_fd, E_fd)
+        m.derivative(sensed, (u - sensed) / if_else(lag > 0, lag, BYPASS_TIME))
+
+    return if_else(passes, scale * seen.I_fd, sensed), close
 
 
 @dataclass(frozen=True)

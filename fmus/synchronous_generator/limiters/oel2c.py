@@ -24,7 +24,12 @@ from dataclasses import dataclass
 
 from fmus.synchronous_generator.data_lines import Given, declared, number, power, seconds
 from fmus.synchronous_generator.excitation.common import Regulated
-from fmus.synchronous_generator.limiters.common import Limited, rate_within_limits
+from fmus.synchronous_generator.limiters.common import (
+    Limited,
+    limit_that_rests,
+    rate_within_limits,
+    sensed_field,
+)
 from fmus.toolchain.blocks import (
     BYPASS_TIME,
     RETURN_TIME,
@@ -85,7 +90,6 @@ _SOURCE = "IEEE 421.5-2016, sample data"
 _OF_CURRENT = (1.5, 2.5)  # values of the input between which it is the field current
 _BY_CURRENT = 1.5  # value of SW from which the current gives the reference's rate: 1 or 2
 _SET = 0.5  # value of the latch above which the limiter is set
-_ALLOWED = 1.01  # of an operating point beyond a limit, which may last: further than rounding
 _LEAST_RATIO = 1e-6  # share of the pickup that is raised to a power: 0 has no rate of change
 _REACHED = 1e-4  # distance [s, pu of the input] from a limit at which it counts as reached
 _NO_RATE = 1e-12  # rate [1, 1/s] that is rounding
@@ -98,7 +102,6 @@ _BEYOND = 1e-2  # part [pu, S_n] by which the controller rests beyond its upper 
 class _Rest:
     """The limits that are taken, and where the limiter rests at the start."""
 
-    sensed: Expr
     act: Expr
     pickup: Expr
     instantaneous: Expr
@@ -112,15 +115,8 @@ def oel2c(m: ModelBuilder, seen: Regulated) -> Limited:
     """Declare the limiter and return its signal to the voltage reference [pu]."""
     p = declared(m, OEL2C, _SOURCE)
     rest = _rest(m, p, p.K_scale * seen.start.E_fd)
-    sensed = m.state("sensed", rest.sensed, "1", "Sensed field voltage or current")
     of_current = logic_and(p.input > _OF_CURRENT[0], p.input < _OF_CURRENT[1])
-    passes = logic_and(of_current, p.T_R <= 0)
-    I_now = if_else(passes, p.K_scale * seen.I_fd, sensed)
-
-    def close(E_fd: Expr) -> None:
-        u = p.K_scale * if_else(of_current, seen.I_fd, E_fd)
-        m.derivative(sensed, (u - sensed) / if_else(p.T_R > 0, p.T_R, BYPASS_TIME))
-
+    I_now, close = sensed_field(m, seen, of_current, p.K_scale, p.T_R)
     ratio, act = I_now / rest.pickup, p.K_act * I_now
     left = p.T_FCL - _timer(m, p, ratio, rest.timer)
     reference = m.state("reference", rest.reference, "1", "Reference of the field current")
@@ -143,19 +139,18 @@ def _rest(m: ModelBuilder, p: Given, I_0: Expr) -> _Rest:
         text = f"{limit}, or 1 % above the operating point where that is beyond it"
         return m.calculated(f"{limit}_taken", value, "1", f"{text} [pu of the input]")
 
-    pickup = declare("I_TFpu", _limit_of(p.I_TFpu, I_0))
+    pickup = declare("I_TFpu", limit_that_rests(p.I_TFpu, I_0))
     ratio = I_0 / pickup
     w = _timer_rate(p, ratio)
     fed = clamp(w / if_else(p.K_FB > 0, p.K_FB, 1), p.T_min, p.T_max)
     timer = if_else(p.K_FB > 0, fed, if_else(w > _NO_RATE, p.T_max, p.T_min))
     left = p.T_FCL - timer
     falls = _ramp(p, ratio, left) < -_NO_RATE
-    thermal = declare("I_lim", if_else(falls, _limit_of(p.I_lim, act), p.I_lim))
-    instantaneous = declare("I_inst", fmax(_limit_of(p.I_inst, act), thermal))
+    thermal = declare("I_lim", if_else(falls, limit_that_rests(p.I_lim, act), p.I_lim))
+    instantaneous = declare("I_inst", fmax(limit_that_rests(p.I_inst, act), thermal))
     reference = if_else(falls, thermal, instantaneous)
     is_set = if_else(logic_or(left <= _REACHED, p.T_en <= 0), 1, 0)
     return _Rest(
-        sensed=I_0,
         act=act,
         pickup=pickup,
         instantaneous=instantaneous,
@@ -164,11 +159,6 @@ def _rest(m: ModelBuilder, p: Given, I_0: Expr) -> _Rest:
         reference=reference,
         is_set=is_set,
     )
-
-
-def _limit_of(limit: Expr, at_start: Expr) -> Expr:
-    """The limit, or what is taken in its place where the start is beyond it."""
-    return if_else(at_start >= limit, _ALLOWED * at_start, limit)
 
 
 def _timer_rate(p: Given, ratio: Expr) -> Expr:

@@ -88,6 +88,18 @@ def test_modes_tell_of_an_operating_point_beyond_the_limits_of_oel2c():
     assert beyond.electromechanical.eigenvalue == pytest.approx(wanted, rel=1e-6)
 
 
+def test_modes_tell_of_an_operating_point_beyond_the_pickup_of_oel3c():
+    """The field current of the start is 2.035 pu; modes are those without the limiter."""
+    values = {"sg1.oel": "oel3c", "sg1.oel.I_TFpu": 1.9}
+    beyond, free = (compute_modes(prepared(x)) for x in (values, {}))
+    (pickup,) = about_limiters(beyond.warnings)
+    assert "beyond the pickup of its limiter of overexcitation, oel.I_TFpu = 1.9" in pickup
+    assert beyond.electromechanical is not None
+    assert free.electromechanical is not None
+    wanted = free.electromechanical.eigenvalue
+    assert beyond.electromechanical.eigenvalue == pytest.approx(wanted, rel=1e-6)
+
+
 def test_modes_tell_of_an_operating_point_beyond_a_limiter_that_integrates():
     """It would never come to rest there; modes are those without it."""
     uel = {"sg1.uel": "uel1", "sg1.uel.K_UR": 0.5, "sg1.uel.K_UI": 1.0, "sg1.uel.V_UIMIN": 0.0}

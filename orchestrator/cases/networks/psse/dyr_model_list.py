@@ -29,7 +29,9 @@ from orchestrator.cases.networks.psse.relay_records import OF_BUSES
 
 _LIBRARY = "PSS/E's model library as PowerWorld's and NEPLAN's guides and ANDES' reader describe it"
 _COMPENSATORS = "PowerWorld's guide to PSS/E's models; CSVGN5 and SVSMO1 as InterPSS reads them"
-_OF_LIMITERS = "IEC 61970-302, STEPSS' page of RAMSES' exciters, Dynawo, OpenIPSL"
+_OF_LIMITERS = (
+    "IEC 61970-302, STEPSS' page of RAMSES' exciters, Dynawo, OpenIPSL; PowerWorld's help (OEL3C)"
+)
 _REGFM = "WECC's specification of REGFM_A1"
 _REGFM_B1 = "WECC's specification of REGFM_B1, in PNNL's script for PSS/E"
 _LOADS = "GridPACK's reader and model"

@@ -19,9 +19,14 @@ _INVERSE_TIME = (("oel.EFD1", "oel.TIME1"), ("oel.EFD2", "oel.TIME2"), ("oel.EFD
 """Points of MAXEX1's and MAXEX2's inverse time: field [of the rated one], and the time there [s]."""
 
 _MOST_SIGNALS = ("oel.V_OELMAX1", "oel.V_OELMAX2", "oel.V_OELMAX3")
-"""Upper limits of OEL2C's signal [pu]; the lowest one counts."""
+"""Upper limits of OEL2C's signal [pu], and of OEL3C's without the last; the lowest one counts."""
 
 _INPUTS_OF_OEL2C = (1, 2)  # field voltage and field current
+_VOLTAGE_OF_OEL3C = 1  # the input that is the field voltage
+
+_LEAST_EXPONENT = (
+    1  # of the inverse time of OEL3C, from which one is plausible: 1 in IEEE 421.5-2016
+)
 
 _LIMITS_OF_COMPENSATORS = (
     ("Vrefmin", "Vrefmax", "the slow control cannot move the reference as it is meant"),
@@ -45,6 +50,7 @@ def doubts_of_machine(
     yield from _offsets(records, values)
     yield from _inverse_times(records, values)
     yield from _of_oel2c(records, values)
+    yield from _of_oel3c(records, values)
     yield from _turned_limits(records, values)
     x_d2, x_source = values.get("machine.X_d2"), machine.source.imag
     if x_d2 is None or abs(x_source - x_d2) <= _SAME * abs(x_d2):
@@ -144,8 +150,7 @@ def _of_oel2c(
     records: Sequence[DynamicRecord], values: Mapping[str, float]
 ) -> Iterator[DoubtOfRecord]:
     """Ask about an OEL2C that limits what our part does not see, or that is made for a gate."""
-    most = min((values[name] for name in _MOST_SIGNALS if name in values), default=0.0)
-    record = next((one for one in records if "oel.I_TFpu" in _sets(one.name)), None)
+    record = next((one for one in records if "oel.T_FCL" in _sets(one.name)), None)
     if record is None or "oel.input" not in values:
         return
     if values["oel.input"] not in _INPUTS_OF_OEL2C:
@@ -157,15 +162,7 @@ def _of_oel2c(
         yield DoubtOfRecord(
             "oel.input", record.place, text, f"an input of {record.name} unlike 1, 2"
         )
-    if most > 0:
-        text = (
-            f"{record.name} rests at up to {most:g} pu, and its exciter adds that to the voltage reference: it acts "
-            "before its limit; where it is added the least of VOELMAX1, VOELMAX2 and VOELMAX3 is 0, at a gate far "
-            "above: correct it, or the exciter's record"
-        )
-        yield DoubtOfRecord(
-            "oel.V_OELMAX1", record.place, text, "a limiter that rests above 0 at a sum"
-        )
+    yield from _rests_above(record, values, "VOELMAX1, VOELMAX2 and VOELMAX3")
     given = given_values(record, RECORDS_OF_UNITS[record.name].fields, {*RECORDS_OF_UNITS, *FIELDS})
     if given["IFDRATED"] not in (0, 1):
         text = (
@@ -173,6 +170,46 @@ def _of_oel2c(
             "per unit of KSCALE times the field voltage or current; make KSCALE 1/IFDRATED where they are not"
         )
         yield DoubtOfRecord("oel.K_scale", record.place, text, f"a rated current of {record.name}")
+
+
+def _of_oel3c(
+    records: Sequence[DynamicRecord], values: Mapping[str, float]
+) -> Iterator[DoubtOfRecord]:
+    """Ask about an OEL3C whose input or exponent is doubtful, or that is made for a gate."""
+    record = next((one for one in records if "oel.T_oel" in _sets(one.name)), None)
+    if record is None or "oel.input" not in values:
+        return
+    if values["oel.input"] != _VOLTAGE_OF_OEL3C:
+        text = (
+            f"{record.name} has INPUT = {values['oel.input']:g}, and only of 1, the field voltage, its public source "
+            "leaves no doubt: the field current is limited; where it means the exciter's own field current, look at "
+            "KSCALE and ITFPU, or give INPUT = 1"
+        )
+        yield DoubtOfRecord("oel.input", record.place, text, f"an input of {record.name} unlike 1")
+    if values["oel.K_1"] < _LEAST_EXPONENT:
+        text = (
+            f"{record.name} has K1 = {values['oel.K_1']:g}, an exponent below 1; its fields are read in the order "
+            "INPUT ITFPU KSCALE TF K1 KOEL TOEL KPOEL VOELMAX1 VOELMIN1 VOELMAX2 VOELMIN2 of PowerWorld's help: "
+            "look whether the record has them in that order"
+        )
+        yield DoubtOfRecord("oel.K_1", record.place, text, f"an exponent of {record.name} below 1")
+    yield from _rests_above(record, values, "VOELMAX1 and VOELMAX2")
+
+
+def _rests_above(
+    record: DynamicRecord, values: Mapping[str, float], limits: str
+) -> Iterator[DoubtOfRecord]:
+    """Ask about a limiter of overexcitation that rests above 0; ``limits``: names of its fields that decide that."""
+    most = min((values[name] for name in _MOST_SIGNALS if name in values), default=0.0)
+    if most > 0:
+        text = (
+            f"{record.name} rests at up to {most:g} pu, and its exciter adds that to the voltage reference: it acts "
+            f"before its limit; where it is added the least of {limits} is 0, at a gate far above: correct it, or the "
+            "exciter's record"
+        )
+        yield DoubtOfRecord(
+            "oel.V_OELMAX1", record.place, text, "a limiter that rests above 0 at a sum"
+        )
 
 
 def _turned_limits(

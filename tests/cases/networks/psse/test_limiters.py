@@ -149,6 +149,53 @@ def test_an_oel2c_of_a_gate_beside_an_exciter_that_adds_is_asked_about(tmp_path)
     assert doubt.text.startswith("OEL2C rests at up to 10 pu, and its exciter adds that")
 
 
+OEL3C = "1 'OEL3C' 1 {input} 1.05 0.5 0.03 {exponent} 1.2 12 0.8 0.4 -0.9 {most} -0.7 /\n"
+
+
+def of_oel3c(tmp_path, **changed):
+    values = {"input": 1, "exponent": 2, "most": 0} | changed
+    return read(tmp_path, GENROU + SEXS + OEL3C.format(**values))
+
+
+def test_oel3c_has_its_fields_in_the_order_of_powerworld_s_help(tmp_path):
+    model, uses, asked = of_oel3c(tmp_path)
+    own = {n.removeprefix("oel."): x for n, x in model.parameters.items() if n.startswith("oel.")}
+    assert model.parts["oel"] == "oel3c"
+    assert own == {
+        "input": 1,
+        "I_TFpu": 1.05,
+        "K_scale": 0.5,
+        "T_F": 0.03,
+        "K_1": 2,
+        "K_oel": 1.2,
+        "T_oel": 12,
+        "K_P": 0.8,
+        "V_OELMAX1": 0.4,
+        "V_OELMIN1": -0.9,
+        "V_OELMAX2": 0,
+        "V_OELMIN2": -0.7,
+    }
+    assert {use.use for use in uses} == {UseOfRecord.USED}
+    assert asked == []
+    assert not [doubt for doubt in model.doubts if doubt.variable.startswith("oel")]
+
+
+@pytest.mark.parametrize(
+    ("values", "variable", "said"),
+    [
+        ({"input": 0}, "oel.input", "OEL3C has INPUT = 0, and only of 1, the field voltage"),
+        ({"input": 2}, "oel.input", "OEL3C has INPUT = 2, and only of 1, the field voltage"),
+        ({"exponent": 0.02}, "oel.K_1", "OEL3C has K1 = 0.02, an exponent below 1"),
+        ({"most": 9}, "oel.V_OELMAX1", "OEL3C rests at up to 0.4 pu, and its exciter adds that"),
+    ],
+)
+def test_what_is_doubtful_in_an_oel3c_is_asked_about(values, variable, said, tmp_path):
+    model, _, _ = of_oel3c(tmp_path, **values)
+    (doubt,) = (one for one in model.doubts if one.variable.startswith("oel"))
+    assert doubt.variable == variable
+    assert doubt.text.startswith(said)
+
+
 def used(tmp_path, *texts):
     model, uses, asked = read(tmp_path, GENROU + "".join(texts))
     by_name = {use.kind: use.use for use in uses}
