@@ -263,7 +263,8 @@ class _Solver:
             f"only capacitances (charging of lines, capacitors) lead the zero sequence to earth from {place}, Z0 = "
             f"{_words(zero)} pu on 100 MVA: a fault of kind {kind} draws no more than their current there, and "
             "voltages may rise while it lasts, as in a network whose neutrals are not earthed; if neutrals are, say "
-            f'which, such as [network.sequences] {said} or a transformer\'s vector group, groups.NAME = "YNd", or {file}'
+            f"which, such as [network.sequences] {said} or a transformer's vector group, "
+            f'groups.NAME = "YNd", or {file}'
         )
         self._asked.append(
             Problem(
