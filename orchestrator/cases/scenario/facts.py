@@ -30,7 +30,7 @@ class Facts:
     governed: bool  # whether a machine has a governor
     load_mw: float  # active power of all loads, without what feeds in [MW]
     load_model: str
-    # units at the slack bus, with their power [MW] and their rating [MVA]
+    # units at the slack bus, with their power [MW] and their S_n [MVA]: the base of their data, MBASE in a RAW file
     slack: tuple[tuple[str, float, float], ...]
     voltages_pu: tuple[float, float]  # least and largest magnitude
 
@@ -51,7 +51,10 @@ class Facts:
             parts.append("no governor")
         parts.append(f"{self.load_mw:.5g} MW of load ({self.load_model})")
         if self.slack:
-            units = [f"{n} at {p:.4g} MW ({100 * p / S_n:.0f} %)" for n, p, S_n in self.slack]
+            units = [
+                f"{name} at {p:.4g} MW ({100 * p / S_n:.0f} % of S_n = {S_n:g} MVA)"
+                for name, p, S_n in self.slack
+            ]
             parts.append(f"slack {', '.join(units)}")
         parts.append("voltages {:.3g} to {:.3g} pu".format(*self.voltages_pu))
         return f"{', '.join(self.sources)}: {', '.join(parts)}"
@@ -62,7 +65,7 @@ def _is_governed(machine: ComponentPlan) -> bool:
 
 
 def _feeding(name: str, unit: ComponentPlan, flow: PowerFlow) -> tuple[str, float, float]:
-    """A unit's name, its power [MW] and its rating [MVA]."""
+    """A unit's name, its power [MW] and its S_n [MVA]."""
     S_n = unit.number("S_n")
     return name, flow.powers[name].real * S_n, S_n
 

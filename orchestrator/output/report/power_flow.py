@@ -12,7 +12,7 @@ COLUMNS = {
         "rating_mva": "Rating [MVA]",
         "p_mw": "P [MW]",
         "q_mvar": "Q [Mvar]",
-        "loading_percent": "Loading [%]",
+        "loading_percent": "Loading [% of rating]",
     },
     "buses": {"name": "Bus", "v_pu": "Voltage [pu]", "angle_deg": "Angle [°]"},
     "branches": {

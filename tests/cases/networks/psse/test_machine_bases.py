@@ -6,9 +6,10 @@ import pytest
 from orchestrator.cases.case import load_case
 from orchestrator.cases.new.new_case import write_case
 from orchestrator.cases.new.wanted_case import WantedCase
+from orchestrator.cases.scenario.facts import facts_of
 from orchestrator.cases.scenario.flow_figures import power_flow_json
 from orchestrator.core.errors import CaseError
-from orchestrator.output.report.power_flow import flow_table
+from orchestrator.output.report.power_flow import COLUMNS, flow_table
 from orchestrator.studies.modes.modes import compute_modes
 from tests.support.scenarios import prepare_one
 
@@ -90,6 +91,15 @@ def test_loading_and_usual_ranges_are_of_the_rating(prepared):
     asked = " ".join(question.text for question in scenario.questions)
     assert "is the base of the machine's data" in asked
     assert "outside of" not in asked
+
+
+def test_the_line_of_facts_says_of_what_the_slack_feeds_a_part(prepared):
+    """The table tells the part of the rating, here 1000 MVA, and apparent power."""
+    scenario = prepared(100.0, 100.0)
+    (west, _) = power_flow_json(scenario)["machines"]
+    part = f"sg1 at {west['p_mw']:.4g} MW ({west['p_mw']:.0f} % of S_n = 100 MVA)"
+    assert part in facts_of(scenario).sentence()
+    assert COLUMNS["machines"]["loading_percent"] == "Loading [% of rating]"
 
 
 def test_typical_data_are_on_what_the_reference_feeds(prepared):
