@@ -68,11 +68,25 @@ def _weight(
     here, there = _least_damped(result), None if found is None else _least_damped(found)
     if here is None or there is None:
         return 0.0, ""
+    return min(here.damping_percent, there.damping_percent), _in_words(here, there, frequency_range)
+
+
+def _in_words(as_impedance: Mode, as_power: Mode, frequency_range: tuple[float, float]) -> str:
+    """The question, which says so where one load model makes the mode grow and the other one does not."""
     low, high = frequency_range
-    return min(here.damping_percent, there.damping_percent), (
-        f"the load model moves the least damped mode from {low:g} to {high:g} Hz: impedance {_figures(here)}, power "
-        f"{_figures(there)}; write which in [network], as load_model"
+    turns = _grows(as_impedance) != _grows(as_power)
+    impedance, power = (
+        _figures(mode) + (", unstable" if turns and _grows(mode) else "")
+        for mode in (as_impedance, as_power)
     )
+    return (
+        f"the load model moves the least damped mode from {low:g} to {high:g} Hz: impedance {impedance}, power "
+        f"{power}; write which in [network], as load_model"
+    )
+
+
+def _grows(mode: Mode) -> bool:
+    return mode.damping_percent < 0
 
 
 def _least_damped(result: ModesResult) -> Mode | None:
