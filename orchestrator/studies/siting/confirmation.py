@@ -67,6 +67,28 @@ class SearchEnd:
 
 
 @dataclass(frozen=True)
+class SmallerDevice:
+    """A device of a small part of its bus's short-circuit power, tried where a larger one confirmed nothing.
+
+    Attributes
+    ----------
+    rating_mva
+        Rating of the smaller device [MVA].
+    larger_mva
+        Rating of the device that confirmed nothing [MVA].
+    short_circuit_mva
+        Short-circuit power of the bus without a device [MVA].
+    found
+        What coupled FMUs say of the smaller one.
+    """
+
+    rating_mva: float
+    larger_mva: float
+    short_circuit_mva: float
+    found: "Confirmation"
+
+
+@dataclass(frozen=True)
 class Confirmation:
     """Results of the coupled FMUs at one bus: Δλ [rad/s] by a small gain of the tuned POD, or by a device without
     one, as predicted and as coupled; λ with the device, its POD off; the POD's setting and λ with it; the least
@@ -84,6 +106,7 @@ class Confirmation:
     failure: str = ""
     search: SearchEnd | None = None  # for the gain of the POD
     beside: complex | None = None
+    smaller: SmallerDevice | None = None  # tried at the bus where this one confirms nothing
 
     @property
     def error(self) -> float:

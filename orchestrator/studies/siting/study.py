@@ -2,6 +2,7 @@
 
 import cmath
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
 from typing import Any, cast
@@ -9,6 +10,7 @@ from typing import Any, cast
 from orchestrator.cases.case import Case
 from orchestrator.cases.form.schema import ComponentTable
 from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.cases.scenario.short_circuit import ShortCircuit
 from orchestrator.core.asked import (
     DAMPING,
     FILE,
@@ -35,7 +37,12 @@ from orchestrator.studies.operating_points.preparation import ItemPreparation, f
 from orchestrator.studies.points.request import OfCase, of_frequencies, of_scenario, of_values
 from orchestrator.studies.siting import placing
 from orchestrator.studies.siting.candidates import candidates, question_about, unit_terminals
-from orchestrator.studies.siting.confirmation import Confirmation, confirmed, swings_outside
+from orchestrator.studies.siting.confirmation import (
+    Confirmation,
+    SmallerDevice,
+    confirmed,
+    swings_outside,
+)
 from orchestrator.studies.siting.residues import SeenMode, Situation, situation_of
 
 PODS = {"pod_p": placing.ACTIVE, "pod_q": placing.REACTIVE}
@@ -49,6 +56,10 @@ _RATING = FieldKind(
 _DEVICE = FieldKind("DEVICE", str, lambda given, argument: str(text_or_none(str(given), argument)))
 # A bus that moves a mode by less than this part of what the best bus does hardly reaches it
 HARDLY = 0.02
+
+_SMALL = 0.05
+"""Part of a bus's short-circuit power up to which a converter there is a small device: a short-circuit ratio of 20. A
+prediction takes the mode for that without the device, which a larger one changes by its mere presence."""
 
 
 @dataclass(frozen=True)
@@ -356,10 +367,10 @@ def _with_confirmations(
     )
     found = []
     outside = swings_outside(result.intact.found) if request.confirm else []
-    for k, bus in enumerate(result.ranking[: request.confirm]):
-        prepared = _prepared(placing.with_devices(result.case, device, [bus]), request, scenario)
-        one = confirmed(
-            prepared,
+
+    def with_device(bus: str, device: ComponentTable) -> Confirmation:
+        return confirmed(
+            _prepared(placing.with_devices(result.case, device, [bus]), request, scenario),
             bus,
             seen,
             request.frequencies,
@@ -368,10 +379,31 @@ def _with_confirmations(
             known=result.intact.found.modes,
             outside=outside,
         )
+
+    for k, bus in enumerate(result.ranking[: request.confirm]):
+        one = with_device(bus, device)
+        if not (one.agrees or one.failure or request.is_foreign):
+            one = replace(one, smaller=_smaller_device(result, bus, with_device))
         found.append(one)
         report(k + 1)
     result = replace(result, confirmations=tuple(found))
     return _by_coupled(result) if result.by_coupled else result
+
+
+def _smaller_device(
+    result: SiteResult, bus: str, tried: Callable[[str, ComponentTable], Confirmation]
+) -> SmallerDevice | None:
+    """Try a device of ours that is small for its bus; None where that is known to be so already, or cannot be known."""
+    with suppress(CosimError):  # nothing feeds a short circuit where there are converters alone
+        strengths = ShortCircuit.of(result.prepared).strengths()
+        (power,) = (one.s_sc_mva for one in strengths if one.bus == bus)
+        largest = result.request.rating or placing.OURS_MVA
+        rating = float(f"{_SMALL * power:.2g}")  # as somebody would type it
+        if rating >= largest:
+            return None
+        device = placing.converter(result.prepared, rating, result.request.controller)
+        return SmallerDevice(rating, largest, power, tried(bus, device))
+    return None
 
 
 def _by_coupled(result: SiteResult) -> SiteResult:

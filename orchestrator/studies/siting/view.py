@@ -19,7 +19,7 @@ from orchestrator.output.report.short_texts import share_text
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.points.code import code_hash
-from orchestrator.studies.siting.confirmation import Confirmation
+from orchestrator.studies.siting.confirmation import Confirmation, SmallerDevice
 from orchestrator.studies.siting.place_ranking import PlaceRanking
 from orchestrator.studies.siting.placing import ACTIVE, OURS_MVA, REACTIVE
 from orchestrator.studies.siting.residues import SeenMode, Situation
@@ -149,6 +149,8 @@ def answer_in_parts(result: SiteResult) -> tuple[str, str]:
     then = "".join(f"{_doubt(one)}; as it is now, {with_it(one)}" for one in tried)
     moved = result.shifts[DEVICE][at][mode.label][best[0]]
     is_place = f"is the best place for {device_title(result)}{among}"
+    if len(result.ranking) == 1:  # the best and the worst of one
+        is_place = f"as a place for {device_title(result)}"
     if moved.hardly:
         part = f"{100 * moved.part:.1g} % of what the strongest place does"
         is_place = f"is hardly a place for {device_title(result)}, with {part}"
@@ -190,8 +192,25 @@ def _support_alone(result: SiteResult) -> str:
 def _doubt(one: Confirmation) -> str:
     """Tell of a place that coupled FMUs do not confirm; "" of one that they do."""
     return (
-        "" if one.agrees else f" (NOT CONFIRMED: the prediction is off by {100 * one.error:.2g} %)"
+        ""
+        if one.agrees
+        else f" (NOT CONFIRMED: the prediction is off by {100 * one.error:.2g} %{_too_large(one)})"
     )
+
+
+def _too_large(one: Confirmation) -> str:
+    """Tell whether it is the device's size for which a prediction is off, by what a smaller one gave there."""
+    smaller = one.smaller
+    if smaller is None:
+        return ""
+    trial = f"{Option.RATING} {smaller.rating_mva:g}"
+    if smaller.found.failure:
+        return f"; with {trial} nothing is known: {smaller.found.failure}"
+    off = f"off by {100 * smaller.found.error:.2g} %"
+    if smaller.found.agrees:
+        power = f"{smaller.short_circuit_mva:.0f} MVA short-circuit power"
+        return f", as {smaller.larger_mva:g} MVA is much for a bus of {power}; {trial} is confirmed, {off}"
+    return f"; its size is not the cause: {trial} is {off}"
 
 
 def with_it(one: Confirmation) -> str:
@@ -286,6 +305,7 @@ def _confirmed(result: SiteResult, one: Confirmation, before: float) -> str:
 def _prediction(one: Confirmation) -> str:
     """Tell what of the mode was predicted, and how far it is off: never the figure of the ranking by support."""
     off = f"off by {100 * one.error:.2g} %"
+    off += _too_large(one)
     if one.setting is not None:
         return f"the mode's shift by a small gain, as predicted, is {off}"
     predicted = f"the device's own response predicts {one.damping_predicted:.2f} %"
@@ -511,6 +531,21 @@ def confirmation_json(one: Confirmation, place: str = "bus") -> dict[str, Any]:
         else eigenvalue_json(one.beside, damping_percent(one.beside)),
         "stable": one.stable,
         "pod": pod,
+        "smaller_device": _smaller_json(one.smaller),
+    }
+
+
+def _smaller_json(smaller: SmallerDevice | None) -> dict[str, Any] | None:
+    """Return as JSON's types what a smaller device at the bus gave; None where none was tried."""
+    if smaller is None:
+        return None
+    found = smaller.found
+    return {
+        "rating_mva": smaller.rating_mva,
+        "short_circuit_mva": smaller.short_circuit_mva,
+        "agrees": found.agrees,
+        "error_percent": None if found.failure else 100 * found.error,
+        "failure": found.failure or None,
     }
 
 

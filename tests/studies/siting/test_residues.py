@@ -12,7 +12,8 @@ from orchestrator.cases.case import load_case
 from orchestrator.linear.models.linearization import Blocks
 from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.studies.modes.modes import running
-from orchestrator.studies.siting import placing, residues
+from orchestrator.studies.siting import placing, residues, study
+from orchestrator.studies.siting.confirmation import Confirmation
 from orchestrator.studies.siting.placing import ideal_support
 from orchestrator.studies.siting.study import SiteRequest, find_sites
 from orchestrator.studies.siting.view import Siting, answer, open_points, remarks, sureness
@@ -49,7 +50,7 @@ def test_phasor_and_emt_models_say_the_same():
 def test_only_the_buses_asked_for_are_places():
     found = sites("two_area_rms", "pod_p", confirm=0, buses=("3",))
     assert found.ranking == ("bus_3",)
-    assert answer(found).startswith("bus_3 is the best place for POD-P of those asked for: ")
+    assert answer(found).startswith("bus_3 as a place for POD-P: ")
     with pytest.raises(
         gfor_api.CosimError, match=r"buses bus3: there is no such bus; did you mean bus_3"
     ):
@@ -70,9 +71,43 @@ def test_a_wrong_sign_at_the_bus_is_caught(gfor, monkeypatch):
 
     true_space = residues.state_space
     monkeypatch.setattr(residues, "state_space", reversed_inputs)
-    code, out, _ = gfor("site", "two_area_rms", "--scenario", "gfor", "--confirm", "1")
+    code, out, _ = gfor(
+        "site", "two_area_rms", "--scenario", "gfor", "--confirm", "1", "--rating", "400"
+    )
     assert code == 3
     assert "NOT CONFIRMED" in out
+    assert "; its size is not the cause: --rating 230 is off by " in out
+
+
+def test_a_device_too_large_for_its_bus_is_told_with_the_rating_that_is_confirmed(gfor):
+    """It changes the mode by its mere presence, and a prediction starts from the mode without it."""
+    words = ("site", "two_area_rms", "--scenario", "gfor", "--confirm", "1", "--rating")
+    code, out, _ = gfor(*words, "3000")
+    said = " ".join(out.split())
+    assert code == 3
+    power = re.search(r"as 3000 MVA is much for a bus of (\d+) MVA short-circuit power; ", said)
+    assert power is not None
+    rating, off = re.search(r"; --rating ([\d.]+) is confirmed, off by ([\d.]+) %", said).groups()
+    assert float(rating) == pytest.approx(int(power[1]) / 20, rel=0.03)
+    assert float(off) < 1
+    code, out, _ = gfor(*words, rating)
+    assert code == 0
+    assert f"is off by {off} %" in " ".join(out.split())
+
+
+def test_a_device_that_is_small_for_its_bus_is_tried_once(monkeypatch):
+    tried = []
+
+    def confirmed(prepared, bus, *_, **__):
+        tried.append(prepared.system.components[f"site_{bus}"].number("S_n"))
+        return Confirmation(bus, predicted=1.1j, coupled=1j)
+
+    monkeypatch.setattr(study, "confirmed", confirmed)
+    (small,) = sites("two_area_rms", "pod_p", confirm=1, rating=100.0).confirmations
+    (large,) = sites("two_area_rms", "pod_p", confirm=1, rating=1000.0).confirmations
+    assert small.smaller is None
+    assert large.smaller is not None
+    assert tried == [100.0, 1000.0, large.smaller.rating_mva]
 
 
 def test_an_injection_is_what_a_device_feeds_at_the_same_bus():
