@@ -30,7 +30,7 @@ from orchestrator.core.safe_files import write_text
 from orchestrator.core.spelling import Text
 from orchestrator.devices.fmi.vendor_files import is_vendor_file
 from orchestrator.face.cli.arguments import add_options
-from orchestrator.face.cli.terminal import make_console, print_json, print_parts
+from orchestrator.face.cli.terminal import make_console, print_json, print_parts, warn
 from orchestrator.output.report.short_texts import first_few
 from orchestrator.output.report.terminal_tables import PlainTable, make_table
 
@@ -95,9 +95,13 @@ def _written(options: argparse.Namespace) -> int:
     regions = region_totals(made.scenarios[0]) if made.scenarios else []
     if options.details and regions:
         print_parts(console, [_table_of_regions(regions)])
-    for prepared in made.scenarios:
-        if prepared.name in ("base", "converter"):
-            _start(prepared, wanted)  # what cannot start is told at once
+    warnings: dict[str, list[str]] = {
+        prepared.name: _start(prepared, wanted)  # what cannot start is told at once
+        for prepared in made.scenarios
+        if prepared.name in ("base", "converter")
+    }
+    for name, texts in warnings.items():
+        warn(name, texts)
     console.print(
         escape(f"Next: gfor modes {wanted.out}{' --black-box' * made.black_box}"), highlight=False
     )
@@ -113,18 +117,23 @@ def _written(options: argparse.Namespace) -> int:
                 "records": as_json(made.records),
                 "regions": [*map(asdict, regions)],
                 "questions": [*dict.fromkeys(made.questions)],
+                "warnings": [*dict.fromkeys(text for texts in warnings.values() for text in texts)],
             }
         )
     return 0
 
 
-def _start(prepared: PreparedScenario, wanted: WantedCase) -> None:
-    """Start the machines of a scenario of the case that is written; the error of what cannot says what to type."""
+def _start(prepared: PreparedScenario, wanted: WantedCase) -> list[str]:
+    """Start the machines of a scenario of the case that is written, and return warnings of their limiters.
+
+    The error of what cannot start says what to type."""
     from orchestrator.cases.scenario.service import in_service  # noqa: PLC0415 - these import what a run needs
+    from orchestrator.linear.doubts.excitation_limiters import limiter_warnings  # noqa: PLC0415
     from orchestrator.studies.modes.modes import running  # noqa: PLC0415
 
     try:
-        running(in_service(prepared)).close()
+        with running(in_service(prepared)) as master:
+            return [*limiter_warnings(master, f"gfor modes {shlex.quote(str(wanted.out))} --set")]
     except StartError as error:
         first, *others = error.problems
         written = Problem(str(wanted.out), _after_refusal(prepared, wanted), first.kind)

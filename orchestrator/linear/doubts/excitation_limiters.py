@@ -1,6 +1,6 @@
 """Warnings of limiters of excitation that act where a machine starts, or would act there in time."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from orchestrator.core.options import Option
@@ -15,33 +15,55 @@ _LATER = {
 }
 """Variables by how much a limiter acts later than its data say, in words; 0 where the start is within its edge."""
 
+_FIELD = "E_fd"
+"""Output of a machine: its field voltage [pu], which in steady state is the field current."""
+
 _YES = 0.5  # above it an output says yes
 
 
 @dataclass(frozen=True)
 class _Limit:
-    """A limit that an operating point may lie beyond; ``taken``: the same as it is taken; ``then``: its effect."""
+    """A limit that an operating point may lie beyond.
+
+    ``taken``: the same as it is taken; ``then``: its effect there; ``would``: what it would do as it is given;
+    ``base``: the parameter that it is per unit of, where it is in parts of another."""
 
     name: str
     taken: str
     words: str
     then: str
+    would: str
+    base: str = ""
 
+    def level(self, scope: str, found: Mapping[str, float]) -> str:
+        """Return the limit as the data have it, in pu of the field voltage too where it is per unit of another."""
+        limit = found[f"{scope}.{self.name}"]
+        told = f"{scope}.{self.name} = {limit:g}"
+        if not self.base:
+            return told
+        base = found[f"{scope}.{self.base}"]
+        return f"{told} of {scope}.{self.base} = {base:g}, which is {limit * base:.4g} pu"
+
+
+_RUNS_OUT = "its time would run out, and it would pull the field down"
+_AT_ONCE = "it would pull the field down"
 
 _LIMITS = (
-    _Limit("EFD1", "first_point", "the first point", "the time runs beyond"),
-    _Limit("I_TFpu", "I_TFpu_taken", "the pickup", "the time runs beyond"),
-    _Limit("I_inst", "I_inst_taken", "the instantaneous limit", "it holds beyond"),
-    _Limit("I_lim", "I_lim_taken", "the thermal limit", "it holds beyond"),
+    _Limit("EFD1", "first_point", "the first point", "the time runs beyond", _RUNS_OUT, "EFDRATED"),
+    _Limit("I_TFpu", "I_TFpu_taken", "the pickup", "the time runs beyond", _RUNS_OUT),
+    _Limit("I_inst", "I_inst_taken", "the instantaneous limit", "it holds beyond", _AT_ONCE),
+    _Limit("I_lim", "I_lim_taken", "the thermal limit", "it holds beyond", _AT_ONCE),
 )
 
 
-def limiter_warnings(master: Master) -> tuple[str, ...]:
-    """Warn of limiters that are beyond their limits; for a master at its start."""
-    return tuple(text for name in master.components for text in _of_machine(master, name))
+def limiter_warnings(master: Master, setting: str = Option.SET) -> tuple[str, ...]:
+    """Warn of limiters that are beyond their limits; for a master at its start.
+
+    ``setting``: what is typed before a value by name: where the command itself has no such option, with another."""
+    return tuple(text for name in master.components for text in _of_machine(master, name, setting))
 
 
-def _of_machine(master: Master, name: str) -> Iterator[str]:
+def _of_machine(master: Master, name: str, setting: str) -> Iterator[str]:
     component = master.components[name]
     variables = component.description.variables
     for scope, kind in _KINDS.items():
@@ -49,11 +71,13 @@ def _of_machine(master: Master, name: str) -> Iterator[str]:
         if not {acts, signal} <= variables.keys():
             continue
         limits = [one for one in _LIMITS if f"{scope}.{one.taken}" in variables]
-        names = [f"{scope}.{name}" for one in limits for name in (one.name, one.taken)]
+        names = [
+            f"{scope}.{name}" for one in limits for name in (one.name, one.taken, one.base) if name
+        ]
         later = {f"{scope}.{one}": words for one, words in _LATER.items()}
         later = {one: words for one, words in later.items() if one in variables}
-        found = component.values([acts, signal, *names, *later])
-        without = f"{Option.SET} {name}.{scope}=none"
+        found = component.values([acts, signal, _FIELD, *names, *later])
+        without = f"{setting} {name}.{scope}=none"
         remedy = f"correct its data, or the operating point; without it: {without}"
         if found[acts] > _YES:
             yield (
@@ -72,6 +96,8 @@ def _of_machine(master: Master, name: str) -> Iterator[str]:
             limit, taken = f"{scope}.{one.name}", f"{scope}.{one.taken}"
             if found[taken] > found[limit]:
                 yield (
-                    f"{name}: the operating point is beyond {one.words} of its limiter of {kind}, {limit} = "
-                    f"{found[limit]:g}: it is let rest, and {one.then} {found[taken]:.4g} ({taken}) only; {remedy}"
+                    f"{name}: the operating point is beyond {one.words} of its limiter of {kind}: {_FIELD} = "
+                    f"{found[_FIELD]:.4g} pu at the start, and {one.level(scope, found)}; in PSS/E {one.would}; here "
+                    f"it is let rest, and {one.then} {found[taken]:.4g} ({taken}) only, and modes are those without "
+                    f"it; {remedy}"
                 )

@@ -223,6 +223,22 @@ def test_what_a_case_that_cannot_start_names_works_as_it_is_typed(gfor, files):
     assert gfor(*files, "--force", "--out", out)[0] == 0
 
 
+def test_a_start_beyond_a_limiter_is_told_with_the_field_voltage(gfor, files):
+    """The limiter of machine 1 ends at 0.55 pu, below any field voltage of a machine that feeds power."""
+    record = "1 'MAXEX2' 1 0 0.5 1.1 60 1.3 30 1.6 15 1.05 0.02 -0.05 /\n"
+    files[1].write_text(files[1].read_text(encoding="utf-8") + record, encoding="utf-8")
+    out = files[0].parent / "case.toml"
+    code, printed, err = gfor(*files, "--out", out, "--json")
+    assert code == 0
+    (said,) = json.loads(printed)["warnings"]
+    assert f"warning: scenario 'base': {said}" in err
+    fields = running(prepare_one(out, "base")).components["sg1"].values(["E_fd"])
+    assert f"E_fd = {fields['E_fd']:.4g} pu at the start, and oel.EFD1 = 1.1 of" in said
+    assert said.endswith(f"without it: gfor modes {out} --set sg1.oel=none")
+    without = compute_modes(prepare_one(out, "base", {"sg1.oel": "none"}))
+    assert not [text for text in without.warnings if "its limiter" in text]
+
+
 def test_limits_of_reactive_power_are_kept_where_asked(gfor, files):
     text = files[0].read_text(encoding="utf-8")
     files[0].write_text(text.replace(",300,-300,", ",20,-20,"), encoding="utf-8")

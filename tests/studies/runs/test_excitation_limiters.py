@@ -57,7 +57,11 @@ def test_modes_tell_that_a_limiter_acts_at_the_operating_point(R):
 def test_modes_tell_of_an_operating_point_beyond_the_first_point_and_are_those_without_it():
     result = compute_modes(prepared(OVER | {"sg1.oel.EFDRATED": 1.0}))
     (text,) = about_limiters(result.warnings)
-    assert "beyond the first point of its limiter of overexcitation, oel.EFD1 = 1.1" in text
+    assert "beyond the first point of its limiter of overexcitation: E_fd = 2.04 pu at the" in text
+    assert (
+        "oel.EFD1 = 1.1 of oel.EFDRATED = 1, which is 1.1 pu; in PSS/E its time would run" in text
+    )
+    assert "the time runs beyond 2.06 (oel.first_point) only" in text  # 1 % above the start
     free = compute_modes(prepared({}))
     assert result.electromechanical is not None
     assert free.electromechanical is not None
@@ -80,8 +84,10 @@ def test_modes_tell_of_an_operating_point_beyond_the_limits_of_oel2c():
     values = {"sg1.oel": "oel2c", "sg1.oel.I_TFpu": 1.9, "sg1.oel.I_inst": 1.95}
     beyond, free = (compute_modes(prepared(x)) for x in (values | {"sg1.oel.I_lim": 1.8}, {}))
     pickup, instantaneous = about_limiters(beyond.warnings)
-    assert "beyond the pickup of its limiter of overexcitation, oel.I_TFpu = 1.9" in pickup
+    assert "beyond the pickup of its limiter of overexcitation: E_fd = 2.04 pu" in pickup
+    assert "and oel.I_TFpu = 1.9; in PSS/E its time would run out" in pickup
     assert "beyond the instantaneous limit of its limiter" in instantaneous
+    assert "oel.I_inst = 1.95; in PSS/E it would pull the field down" in instantaneous
     assert beyond.electromechanical is not None
     assert free.electromechanical is not None
     wanted = free.electromechanical.eigenvalue
