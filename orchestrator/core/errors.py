@@ -1,7 +1,7 @@
 """The errors a user can meet. Each message says what failed, where, the value seen, the rule and the remedy."""
 
 import copyreg
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -265,13 +265,22 @@ class CaseError(InputError):
 
 
 class StartError(CaseError):
-    """A component refuses to start with its values, or from its operating point; ``others``: of components that do
-    so as well."""
+    """A component refuses to start with its values, or from its operating point.
+
+    ``others``: of components that do so as well; ``wider``: values of limits, by ``component.variable``, with which all
+    of them start, empty where one of them has another cause."""
 
     def __init__(
-        self, source: str, problem: Problem, component: str, others: Sequence[Problem] = ()
+        self,
+        source: str,
+        problem: Problem,
+        component: str,
+        others: Sequence[Problem] = (),
+        *,
+        wider: Mapping[str, float] | None = None,
     ) -> None:
         self.component = component
+        self.wider = dict(wider or {})
         super().__init__(source, [problem, *others])
 
 

@@ -1,5 +1,7 @@
 """Messages of a component that cannot start, in the words of the case: its place, its operating point, the remedy."""
 
+from collections.abc import Mapping
+
 from orchestrator.cases.flow.sharing import power_limits
 from orchestrator.cases.new.widened_limits import limits_of_machine
 from orchestrator.cases.scenario.feeding_loads import feeding_loads
@@ -35,20 +37,22 @@ def start_errors(prepared: PreparedScenario, error: ComponentError) -> StartErro
     ]
     ours = [name for name in units if is_ours(prepared.system.components[name].description.path)]
     refused = {name: refusal_to_start(name, prepared.system.components[name]) for name in ours}
-    others = [
-        Problem(
-            prepared.places[name],
-            _text(prepared, refusal, name) + _wider_limits(name, prepared.system.components[name]),
-            ErrorKind.START,
-        )
-        for name, refusal in refused.items()
-        if refusal is not None and refuses_to_start(refusal) and name in prepared.places
-    ]
+    others, wider = list[Problem](), [first.wider]
+    for name, refusal in refused.items():
+        if refusal is None or not refuses_to_start(refusal) or name not in prepared.places:
+            continue
+        limits = _wider_limits(name, prepared.system.components[name])
+        text = _text(prepared, refusal, name) + _typed(limits)
+        others.append(Problem(prepared.places[name], text, ErrorKind.START))
+        wider.append(limits)
     shown, rest = others[:_MOST_OTHERS], others[_MOST_OTHERS:]
     if rest:
         text = f"scenario {prepared.name!r}: {len(rest)} more units cannot start from their operating point"
         shown.append(Problem(prepared.case.source, text, ErrorKind.START))
-    return StartError(prepared.case.source, first.problems[0], first.component, shown)
+    every = (
+        {name: value for limits in wider for name, value in limits.items()} if all(wider) else {}
+    )
+    return StartError(prepared.case.source, first.problems[0], first.component, shown, wider=every)
 
 
 def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError | None:
@@ -69,20 +73,26 @@ def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError
             grid = prepared.system.components.get(prepared.grid)
             fed = feeding_loads(prepared.network, grid, plan.number("S_n"))
             text += f"; {fed}" if fed else ""
-    text += _wider_limits(name, plan)
+    limits = _wider_limits(name, plan)
+    text += _typed(limits)
     # The same values are refused again by a model of ours; an FMU of others may lack a licence today.
     kind = ErrorKind.START if is_ours(plan.description.path) else ErrorKind.FMU
-    return StartError(prepared.case.source, Problem(prepared.places[name], text, kind), name)
+    problem = Problem(prepared.places[name], text, kind)
+    return StartError(prepared.case.source, problem, name, wider=limits)
 
 
-def _wider_limits(name: str, plan: ComponentPlan) -> str:
-    """Return what lets a machine of ours start with wider limits of its exciter and governor, as it is typed."""
+def _wider_limits(name: str, plan: ComponentPlan) -> dict[str, float]:
+    """Return the limits of its exciter and governor with which a machine of ours starts, where they are the cause."""
     if plan.kind != "machine" or not is_ours(plan.description.path):
-        return ""
-    found = limits_of_machine(name, plan)
-    typed = Text("; it starts with" if found else "")
-    for limit in found:
-        typed += " " + Option.SET + f" {limit.name}={limit.taken:g}"
+        return {}
+    return {limit.name: limit.taken for limit in limits_of_machine(name, plan)}
+
+
+def _typed(limits: Mapping[str, float]) -> str:
+    """Return the limits with which a machine starts, as they are typed."""
+    typed = Text("; it starts with" if limits else "")
+    for name, value in limits.items():
+        typed += " " + Option.SET + f" {name}={value:g}"
     return typed
 
 

@@ -15,7 +15,7 @@ from orchestrator.linear.models.linearization import Blocks, continuous
 from orchestrator.linear.models.slope_linearization import covers, linearize_slopes
 from orchestrator.linear.models.state_access import StateAccess
 from orchestrator.studies.modes.modes import running
-from orchestrator.studies.modes.start_errors import start_error
+from orchestrator.studies.modes.start_errors import start_errors
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.step_awareness import other_step
 from orchestrator.systems.coupling.system import ComponentPlan
@@ -55,7 +55,7 @@ class PointBench(Closing):
                 self._master.restart(prepared.system)
             except BaseException as error:
                 self.close()
-                found = start_error(prepared, error) if isinstance(error, ComponentError) else None
+                found = start_errors(prepared, error) if isinstance(error, ComponentError) else None
                 if found is not None:
                     raise found from error
                 raise

@@ -13,6 +13,7 @@ from orchestrator.cases.case import Case, with_protection
 from orchestrator.cases.flow.sharing import SharingRule
 from orchestrator.cases.networks.branch_limits import Loading, Outlier, loadings, outliers
 from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.core.errors import StartError
 from orchestrator.linear.models.apart import standing_apart
 from orchestrator.linear.models.linearization import Blocks
 from orchestrator.linear.models.slope_linearization import gives_slopes
@@ -259,6 +260,7 @@ class _Worker:
                 outliers=outside,
                 has_flow=flow is not None,
                 lasting=lasting,
+                wider=error.wider if isinstance(error, StartError) else {},
             )
             return _Result(record)
 

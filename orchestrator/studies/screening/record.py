@@ -109,6 +109,8 @@ class ItemRecord:
     # communication steps of the map whose modes these are; 0 of the system without a communication step
     map_steps: int = 0
     run: OutageRun | None = None  # the outage as it happens, where that was asked for
+    # values of limits, by ``component.variable``, with which all start that refuse to; empty where others do as well
+    wider: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

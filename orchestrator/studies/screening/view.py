@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from rich.markup import escape as escape_markup
 
+from orchestrator.cases.form.control_limits import is_wider
 from orchestrator.cases.settings.layers import joined_values
 from orchestrator.core.errors import Problem, few, number_of
 from orchestrator.core.late import pd
@@ -410,6 +411,35 @@ def _cause(summary: Summary, item: ScreenedItem) -> str:
     return text
 
 
+def widest(items: Sequence[ScreenedItem]) -> dict[str, float]:
+    """Return limits with which the units of all items start that start with wider limits at all, each at its widest."""
+    found: dict[str, float] = {}
+    for item in items:
+        for name, value in item.record.wider.items():
+            if name not in found or is_wider(name, value, found[name]):
+                found[name] = value
+    return found
+
+
+def with_widest(text: str, first: ScreenedItem, items: Sequence[ScreenedItem]) -> str:
+    """Have an item's reason name the limits that serve all items, where they are wider than its own."""
+    every = widest(items)
+    for name, value in first.record.wider.items():
+        text = text.replace(_typed(name, value), _typed(name, every[name]))
+    return text
+
+
+def all_start_with(items: Sequence[ScreenedItem]) -> str:
+    """Tell with which limits several items start, as one line that is typed once; "" for fewer than two."""
+    number = sum(bool(item.record.wider) for item in items)
+    typed = " ".join(_typed(name, value) for name, value in widest(items).items())
+    return f"  {number} of these {len(items)} start with {typed}" if number > 1 else ""
+
+
+def _typed(name: str, value: float) -> str:
+    return f"{Option.SET} {name}={value:g}"
+
+
 def _places(summary: Summary, items: Sequence[ScreenedItem]) -> str:
     """The items of one cause: the first in full, the outages and the points of all."""
     if len(items) == 1:
@@ -449,7 +479,11 @@ def remarks(summary: Summary) -> list[str]:
         named = [item for item in summary.failures() if item.record.status is status]
         texts.append(f"{status}: {number} of {len(summary.result.items)}:")
         causes = kinds_of((item, [_cause(summary, item)]) for item in named)
-        texts += [f"  {_places(summary, items)}: {text}" for text, items in causes]
+        texts += [
+            f"  {_places(summary, items)}: {with_widest(text, items[0], named)}"
+            for text, items in causes
+        ]
+        texts += filter(None, [all_start_with(named)])
     every = summary.result.items
     kinds = kinds_of((item, _not_said_yet(item)) for item in every)
     texts += [

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 import orchestrator.face.api.case as gfor_face
+from orchestrator.cases.case import load_case
 from orchestrator.cases.flow.sharing import Reserve, SharingRule, droop_gain, power_limits, shares
 from orchestrator.core.errors import ErrorKind, InputError
 from orchestrator.linear.spectra.modes import find_modes
@@ -23,6 +24,7 @@ from orchestrator.studies.screening.request import ScreeningRequest
 from orchestrator.studies.screening.study import plan_screening, run_screening
 from orchestrator.studies.screening.summary import Summary
 from orchestrator.studies.screening.view import as_json, remarks
+from tests.cases.new.test_widened_limits import new_case
 from tests.studies.screening.five_machines import DROOPS, POWERS, RATINGS, five_machines
 
 
@@ -324,6 +326,30 @@ def test_all_that_cannot_be_shared_is_named(tmp_path):
     failures = as_json(found)["failures"]
     assert len(failures) == 15
     assert all("would need" in one["why"] for one in failures)
+
+
+def test_limits_that_are_typed_once_let_all_items_start(tmp_path):
+    """The reason of the first outage named its own limit, and the next outage was refused with it."""
+    case = load_case(new_case(tmp_path, exciter="0.05 -5.0 0.9 /"))
+    outages = "sg1,sg2,sg3,line_14_15"
+
+    def summary_with(values):
+        plan = plan_screening(case, ScreeningRequest(None, outages, "base", values))
+        return Summary(run_screening(plan, Work(Serial(), PointStore(tmp_path / "points"))))
+
+    found = summary_with({})
+    refused = [item for item in found.failures() if item.record.wider]
+    assert len(refused) > 1
+    assert len({tuple(item.record.wider.items()) for item in refused}) > 1
+    *reasons, last = (line for line in remarks(found) if "--set" in line)
+    assert last.startswith(f"  {len(refused)} of these {len(refused)} start with --set ")
+    typed = dict(_set_in(last))
+    assert all(value == typed[name] for line in reasons for name, value in _set_in(line))
+    assert not list(summary_with({name: float(value) for name, value in typed.items()}).failures())
+
+
+def _set_in(line):
+    return re.findall(r"--set (\S+)=([\d.]+)", line)
 
 
 def test_what_cannot_be_shared_says_who_would_need_how_much(five, tmp_path):
