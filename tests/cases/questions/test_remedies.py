@@ -191,7 +191,7 @@ GALLERY = {
         )
         + SEXS,
     ),
-    "second machine of another model": Broken("a second machine of", NINE, f"{DYR}{GENROU}\n"),
+    "second machine of another model": Broken("remove one, or write", NINE, f"{DYR}{GENROU}\n"),
     "converter that is not known": Broken(
         "a grid-following converter", NINE, changed(DYR, (GENCLS, "3 'WT4G1' 1 0 /"))
     ),

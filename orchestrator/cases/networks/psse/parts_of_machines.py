@@ -91,16 +91,15 @@ class PartsOfMachines:
         """Note a record of a kind that the machine has one of already; one of another model may be left out."""
         name = self.names[key][kind]
         first = next(one for one in self.records[key] if one.name == name)
-        problem = (
-            f"{record.place}: a second {kind} of machine {record.machine!r} at bus {record.bus}; the first is {name} "
-            f"in line {first.line}; remove one"
-        )
-        is_alone = self.labels[key] == str(
-            record.bus
-        )  # at its bus: a name with the bus is of its record only
+        # a name with the bus is of this record only, where the machine is alone at its bus
+        is_alone = self.labels[key] == str(record.bus)
+        remedy = "remove one"
         if record.name != name and is_alone:
-            problem += f", or write {without_models([f'{record.name} at {record.bus}'])}"
-        self.problems.append(problem)
+            remedy = f"remove one, or write {without_models([f'{record.name} at {record.bus}'])}"
+        self.problems.append(
+            f"{record.place}: a second {kind} of machine {record.machine!r} at bus {record.bus}; the first is {name} "
+            f"in line {first.line}; {remedy}"
+        )
 
     def _note_unknown(self, record: DynamicRecord, key: MachineKey) -> None:
         """Note a record that no part stands for, where it has a remedy of its own."""
