@@ -14,6 +14,7 @@ import numpy as np
 from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.core.options import Option
 from orchestrator.studies.validation.angle_reference import ask_of_lacking_frequency
+from orchestrator.studies.validation.causes import cap_of_current
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import (
     EventComparison,
@@ -72,6 +73,15 @@ _LEAST_CLOCK = 0.004  # delay [s] that is named, and at least
 _SAMPLES_CLOCK = 0.6  # so many samples
 _ALIKE = 0.25  # part by which the delays of P and Q may differ and be one clock's
 _CLOCK_LEAVES = 0.6  # part of the error that is left once the clocks are alike, to be named
+_AT_ONCE = 0.1  # time after the event's begin in which a right reading shows already [s]
+_FEWEST_AT_ONCE = 5  # samples of that time at least: slow ones may not hold the event's moment
+_MOST_AT_ONCE = 0.75
+"""Part of the movement in that time which a reading leaves at most where a limit of the current is likely as well.
+
+A right sign leaves 0.03 to 0.65 of it beside most wrong parameters, a sign that stands for a limit 1.1 and more: later
+the limited plant's Q is near the other model's with the sign turned."""
+_LIMITED = 1.0, math.inf
+"""Times after the event's begin in which a limit of the current is looked for [s]: a peak makes none in the first."""
 
 
 @dataclass(frozen=True)
@@ -244,7 +254,7 @@ def sign_that_starts(device: PlayedDevice, event: RecordedEvent, bases: PortBase
         return ""
     near = cut_event(event, _AFTER, _BEFORE)
     for reading in READINGS_OF_SIGN:
-        if reading.fits(event.recording) and [*_error_left(device, near, reading, bases)]:
+        if reading.fits(event.recording) and [*_trials_of(device, near, reading, bases)]:
             typed = " ".join(
                 (Option.CHANNEL + f" '{one}'") for one in reading.remedy(event.recording)
             )
@@ -256,28 +266,45 @@ def _likeliest(comparison: EventComparison, bases: PortBases, error: float) -> l
     """The one reading that explains the most, where it explains enough.
 
     What leaves more than the plant moved explains nothing: a model that is out of step has an error that any reading at
-    which it stays in step makes smaller."""
+    which it stays in step makes smaller. Nor does, beside a limit that the plant shows, what explains only later: a
+    reading holds from the first moment."""
     event, device = comparison.event, comparison.device
     near = cut_event(event, _AFTER, _BEFORE)
     here = math.hypot(*rms_error(comparison.near_power(near), near))
     readings = [*READINGS, *_scalings(comparison)]
     tried = [
-        (left, reading)
+        (trial.rest_of_error, reading)
         for reading in readings
         if reading.fits(event.recording)
-        for left in _error_left(device.rough, near, reading, bases)
-        if left <= reading.leaves * here
+        for trial in _trials_of(device.rough, near, reading, bases)
+        if trial.rest_of_error <= reading.leaves * here
     ]
     if not tried:
         return []
     least = min(left for left, _ in tried)
     best = next(reading for left, reading in tried if left <= _AS_GOOD * least)
-    left = min(_error_left(device, event, best, bases), default=math.inf)
-    if left > min(best.leaves * error, math.hypot(*rms_movement(event))):
-        return []
+    most = min(best.leaves * error, math.hypot(*rms_movement(event)))
     remedy = best.remedy(event.recording)
-    figures = {"reading": best.name, "error": error, "left": left, "remedy": remedy}
-    return [Question(QuestionKind.READ_OTHERWISE, figures)]
+    return [
+        Question(
+            QuestionKind.READ_OTHERWISE,
+            {"reading": best.name, "error": error, "left": trial.rest_of_error, "remedy": remedy},
+        )
+        for trial in _trials_of(device, event, best, bases)
+        if trial.rest_of_error <= most and (trial.holds_at_once or not _shows_limit(comparison))
+    ]
+
+
+def _shows_limit(comparison: EventComparison) -> bool:
+    """Return whether the plant's current stays at a level that the model's exceeds, at once or later."""
+    recording = comparison.event.recording
+    since = recording.times - comparison.event.windows.begin
+    for length in _LIMITED:
+        part = recording.good & (since <= length)
+        powers = [comparison.played.power[part]], [recording.power[part]]
+        if cap_of_current(*powers, [np.abs(recording.voltage[part])]) is not None:
+            return True
+    return False
 
 
 def _scalings(comparison: EventComparison) -> Iterator[Reading]:
@@ -342,17 +369,57 @@ def _is_prefix(factor: float) -> bool:
     return factor > 0 and factor != 1 and float(np.log10(factor)).is_integer()
 
 
-def _error_left(
-    device: PlayedDevice, event: RecordedEvent, reading: Reading, bases: PortBases
-) -> Iterator[float]:
-    """The rms error that a reading leaves; nothing where the device cannot start so.
+@dataclass(frozen=True)
+class _Trial:
+    """A device's answer to a recording that is read otherwise: the event as it then is, and the power."""
 
-    The error is counted per unit of the power as it would then be read."""
+    reading: Reading
+    event: RecordedEvent
+    power: Complex
+
+    @property
+    def rest_of_error(self) -> float:
+        """The rms error that the reading leaves, per unit of the power as it is read now."""
+        errors = zip(rms_error(self.power, self.event), self.reading.scales(), strict=True)
+        return math.hypot(*(error / scale for error, scale in errors))
+
+    @property
+    def holds_at_once(self) -> bool:
+        """Return whether it leaves nothing but scatter before the event, and little of the first movement after it.
+
+        One that is of P alone, or of Q, shows there."""
+        recording, windows = self.event.recording, self.event.windows
+        error = self._as_read(self.power - recording.power)
+        moved = self._as_read(recording.power - self.event.start.power)
+        before = windows.part("before", recording.times) & recording.good
+        since = recording.times - windows.begin
+        length = max(_AT_ONCE, _FEWEST_AT_ONCE * recording.interval)
+        first = (since > 0) & (since <= length) & recording.good
+        least = _LEAST_OFF * max(self.reading.scales())
+        scatter = _NOISY * _rms(moved[before])
+        most = math.hypot(scatter, _MOST_AT_ONCE * _rms(moved[first]))
+        return _rms(error[before]) <= max(least, scatter) and _rms(error[first]) <= max(least, most)
+
+    def _as_read(self, power: Complex) -> Complex:
+        """The part of a power that the reading is of: P, Q or both."""
+        if self.reading.roles == ("p",):
+            return np.asarray(power.real, dtype=complex)
+        if self.reading.roles == ("q",):
+            return np.asarray(power.imag, dtype=complex)
+        return power
+
+
+def _rms(values: Complex) -> float:
+    return float(np.sqrt(np.mean(np.abs(values) ** 2))) if len(values) else 0.0
+
+
+def _trials_of(
+    device: PlayedDevice, event: RecordedEvent, reading: Reading, bases: PortBases
+) -> Iterator[_Trial]:
+    """A device's answer to a recording that is read otherwise; nothing where it cannot start so."""
     with device.trials.trial(reading.name):
         changed = prepare_event(reading.change(event.recording), bases, event.windows)
-        played = device.play(changed.recording, changed.start)
-        errors = zip(rms_error(played.power, changed), reading.scales(), strict=True)
-        yield math.hypot(*(error / scale for error, scale in errors))
+        yield _Trial(reading, changed, device.play(changed.recording, changed.start).power)
 
 
 def _meter_elsewhere(
