@@ -5,7 +5,7 @@ per unit of the rating, its largest magnitude, its mean, and the mean of its mag
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,9 @@ from orchestrator.linear.signals.identification import IdentifiedMode
 from orchestrator.output.results.readers import LINE_FREQUENCY
 from orchestrator.studies.signals.comparison import modes_without_doubts, strongest_modes
 from orchestrator.studies.signals.measured import order_of
+from orchestrator.studies.validation.correlation import correlation_length
 from orchestrator.studies.validation.record import Recording
+from orchestrator.studies.validation.shared_modes import shared_modes
 from orchestrator.studies.validation.windows import Windows
 
 SIGNALS = ("p", "q", "i_p", "i_q")
@@ -202,20 +204,6 @@ def noise_in(recording: Recording, values: Numbers, windows: Windows) -> SignalN
     return SignalNoise(scatter, correlation_length(rest))
 
 
-def correlation_length(values: Numbers) -> float:
-    """1 + 2·Σρ [samples], summed until the correlation is gone (Sokal's window); at least 1."""
-    deviation = values - values.mean()
-    total = float(deviation @ deviation)
-    if total <= 0 or len(values) < 4:
-        return 1.0
-    length = 1.0
-    for lag in range(1, len(values) // 2):
-        length += 2 * float(deviation[lag:] @ deviation[:-lag]) / total
-        if lag >= 5 * length:
-            break
-    return max(1.0, length)
-
-
 def errors_in(
     recording: Recording, error: Numbers, windows: Windows, name: str, noise: SignalNoise
 ) -> ErrorFigures | None:
@@ -333,7 +321,7 @@ def _strong(modes: Sequence[IdentifiedMode]) -> list[IdentifiedMode]:
     return [one for one in modes if one.amplitude > _AS_STRONG * modes[0].amplitude]
 
 
-def _by_frequency(modes: Sequence[IdentifiedMode]) -> list[IdentifiedMode]:
+def _by_frequency(modes: Iterable[IdentifiedMode]) -> list[IdentifiedMode]:
     return sorted(modes, key=lambda one: one.frequency_hz)
 
 
@@ -429,6 +417,36 @@ def _thinned(values: Numbers, factor: int) -> Numbers:
     return np.asarray(whole.reshape(-1, factor).mean(axis=1))
 
 
+def _compared_rings(
+    recording: Recording, signals: tuple[Numbers, Numbers], windows: Windows
+) -> tuple[Sequence[ComparedMode], ModeLists]:
+    """The strong modes beside each other, and those of each signal by frequency.
+
+    Where the signals are nearly the same, both have the same modes, and what sets these apart is in the difference."""
+    shared = _shared_rings(recording, signals, windows)
+    if shared:
+        measured, own = zip(*(one.modes for one in shared), strict=True)
+        strong = _by_frequency(measured), _by_frequency(filter(None, own))
+        return shared, strong
+    rings = _ring_downs(recording, signals, windows, identify=strongest_modes)
+    of_each = _by_frequency(_strong(rings[0])), _by_frequency(_strong(rings[1]))
+    return _compared_modes(recording, signals, windows, rings), of_each
+
+
+def _shared_rings(
+    recording: Recording, signals: tuple[Numbers, Numbers], windows: Windows
+) -> list[ComparedMode]:
+    """The strong modes of two signals that are nearly the same; empty where they are not."""
+    measured, own = (_ringing(recording, values, windows) for values in signals)
+    mean = 0.5 * (signals[0] + signals[1])
+    modes, _ = _ring_downs(recording, (mean, mean), windows, identify=strongest_modes)
+    if not modes or measured is None or own is None:
+        return []
+    both = np.asarray(measured.values), np.asarray(own.values)
+    shared = shared_modes(measured["time"].values, both, modes, _strong(modes))
+    return [ComparedMode(one.modes, one.doubt) for one in shared]
+
+
 def compare_signals(
     recording: Recording, simulated: Complex, windows: Windows
 ) -> Mapping[str, SignalFigures]:
@@ -436,12 +454,11 @@ def compare_signals(
     measured, own = recording.power, simulated
     found = {}
     for name, y, x in (("p", measured.real, own.real), ("q", measured.imag, own.imag)):
-        rings = _ring_downs(recording, (y, x), windows, identify=strongest_modes)
-        measured_modes, own_modes = (_by_frequency(_strong(modes)) for modes in rings)
+        compared, strong = _compared_rings(recording, (y, x), windows)
         found[name] = SignalFigures(
             delay_between(recording, y, x, windows),
             (step_of(recording, y, windows), step_of(recording, x, windows)),
-            _compared_modes(recording, (y, x), windows, rings),
-            strong_modes=(measured_modes, own_modes),
+            compared,
+            strong_modes=strong,
         )
     return found

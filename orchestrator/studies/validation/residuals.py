@@ -10,9 +10,9 @@ import numpy as np
 
 from orchestrator.core.arrays import Complex, Matrix, Numbers, Vector
 from orchestrator.core.errors import CosimError, InputError
+from orchestrator.studies.validation.correlation import correlation_length
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import RecordedEvent, noise_before
-from orchestrator.studies.validation.figures import correlation_length
 from orchestrator.studies.validation.hidden import (
     HiddenVoltage,
     hidden_voltages,

@@ -188,3 +188,40 @@ def test_a_mode_that_the_model_lacks_is_told(seed):
     plant = scattering(rings(*ALIKE), 4e-4, seed)
     text = said(plant, scattering(rings(ALIKE[0]), 1e-4, 100 + seed))
     assert re.search(r"ring-down p damping at 0\.31\d* Hz \(the plant rings with a mode", text)
+
+
+DAMPED = (0.76, 0.20, 0.03)
+"""A load step's swing, of which a recording of a few seconds holds little."""
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_difference_that_is_noise_sets_no_modes_apart(seed):
+    """The noise of an identification is many times as large."""
+    plant = scattering(rings(DAMPED), 1.5e-3, seed)
+    model = plant + 5e-4 * np.random.default_rng(100 + seed).standard_normal(len(TIMES))
+    (frequency, damping), doubts = apart(plant, model)
+    assert abs(frequency) < 0.5
+    assert abs(damping) < 0.5
+    assert doubts[1] < 1
+    assert criterion(plant, model).verdict is LimitVerdict.MET
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("points", [-3, -2, 2, 3])
+def test_a_small_shift_of_the_damping_is_in_the_difference(seed, points):
+    frequency, damping, amplitude = DAMPED
+    model = rings((frequency, damping + points / 100, amplitude))
+    plant = scattering(rings(DAMPED), 2e-4, seed)
+    found, doubts = apart(plant, scattering(model, 1e-4, 100 + seed))
+    assert found[1] == pytest.approx(points, abs=0.3)
+    assert found[0] == pytest.approx(0, abs=0.5)
+    assert doubts[1] < 0.5
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_half_the_damping_is_called_wrong(seed):
+    frequency, damping, amplitude = DAMPED
+    model = scattering(rings((frequency, damping / 2, amplitude)), 1e-4, 100 + seed)
+    found = criterion(scattering(rings(DAMPED), 2e-4, seed), model)
+    assert found.verdict is LimitVerdict.NOT_MET
+    assert found.value == pytest.approx(10, abs=1)
