@@ -73,7 +73,7 @@ def shared_modes(
 
 
 def _parts(swing: Complex) -> tuple[Numbers, Numbers]:
-    """What a real and an imaginary factor of a swing make of its real part."""
+    """The parts of a real signal that a real and an imaginary factor of a swing make."""
     return swing.real, -swing.imag
 
 
