@@ -23,7 +23,7 @@ _DEVIATIONS = 2.0  # standard deviations that are the doubt of a shift
 
 
 @dataclass(frozen=True)
-class ModeShift:
+class RingDownShift:
     """A mode of the measured and the simulated signal, and the doubt of their shift: [%], [points of percent]."""
 
     modes: tuple[IdentifiedMode, IdentifiedMode]
@@ -35,7 +35,7 @@ def shared_modes(
     signals: tuple[Numbers, Numbers],
     modes: Sequence[IdentifiedMode],
     strong: Sequence[IdentifiedMode],
-) -> list[ModeShift]:
+) -> list[RingDownShift]:
     """Set the strong modes of two signals apart; none where the signals differ by more than a small part.
 
     Parameters
@@ -96,7 +96,7 @@ def _deviations(table: Matrix, rest: Numbers) -> Numbers:
     return np.asarray(np.sqrt(variance * np.diagonal(np.linalg.pinv(table.T @ table))))
 
 
-def _apart(mode: IdentifiedMode, shift: complex, deviation: complex) -> ModeShift:
+def _apart(mode: IdentifiedMode, shift: complex, deviation: complex) -> RingDownShift:
     """A mode half a shift before and half a shift after where it is in the mean of both signals."""
     at = mode.eigenvalue
     pair = (
@@ -108,4 +108,4 @@ def _apart(mode: IdentifiedMode, shift: complex, deviation: complex) -> ModeShif
         for step in (deviation.real, 1j * deviation.imag)
     ]
     frequency = 100 * _DEVIATIONS * deviation.imag / at.imag
-    return ModeShift(pair, (abs(frequency), math.hypot(*moved)))
+    return RingDownShift(pair, (abs(frequency), math.hypot(*moved)))
