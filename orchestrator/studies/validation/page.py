@@ -9,8 +9,10 @@ from orchestrator.core.safe_files import file_hash
 from orchestrator.output.report.colours import colour
 from orchestrator.output.report.html.charts import ChartCurve, legend, line_chart, thinned
 from orchestrator.output.report.html.elements import Figures, bullet_list, document, table
+from orchestrator.studies.validation.causes import nothing_to_explain
 from orchestrator.studies.validation.event import EventComparison
 from orchestrator.studies.validation.figures import SIGNALS
+from orchestrator.studies.validation.lasting import lasting_errors
 from orchestrator.studies.validation.limits import LimitVerdict
 from orchestrator.studies.validation.study import ValidationResult
 from orchestrator.studies.validation.tables import (
@@ -25,6 +27,7 @@ from orchestrator.studies.validation.words import (
     explanation_sentence,
     fit_sentence,
     interval_head,
+    lasting_sentence,
     open_sentence,
     sentence,
     untold_words,
@@ -65,6 +68,9 @@ def validation_page(result: ValidationResult) -> str:
     says.append(yardstick_sentence(of_both))
     left = open_sentence(result.criteria, result.devices)
     says += [f"{left}."] if left else []
+    if result.verdict is LimitVerdict.MET:
+        lasting = lasting_sentence(lasting_errors(of_both), explained=result.request.explain)
+        says += [f"{lasting[0].upper()}{lasting[1:]}."] if lasting else []
     places = [one for one in result.apart if one.more_than_from_record]
     says += [difference_sentence(places)] if places else []
     says += [_causes_said(result)] if result.request.explain else []
@@ -185,7 +191,7 @@ def _fit(result: ValidationResult) -> str:
 
 def _explained(result: ValidationResult) -> str:
     said = f"<p>{escape(_causes_said(result))}</p>"
-    if not result.explanations:
+    if not result.explanations or nothing_to_explain(result.explanations):
         return said
     return said + explanation_table(result.explanations).html()
 

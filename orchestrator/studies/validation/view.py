@@ -21,8 +21,10 @@ from orchestrator.output.report.terminal_tables import PlainTable, make_table
 from orchestrator.output.report.verdict_sentence import VerdictSentence
 from orchestrator.output.results.file_writers import save_json, save_table
 from orchestrator.output.results.staging import new_run_id, staged
+from orchestrator.studies.validation.causes import nothing_to_explain
 from orchestrator.studies.validation.event import EventComparison
 from orchestrator.studies.validation.fit import Fit
+from orchestrator.studies.validation.lasting import lasting_errors
 from orchestrator.studies.validation.limits import Criterion, LimitVerdict
 from orchestrator.studies.validation.questions import Question
 from orchestrator.studies.validation.study import ValidationResult
@@ -39,6 +41,7 @@ from orchestrator.studies.validation.words import (
     explanation_sentence,
     fit_sentence,
     interval_head,
+    lasting_sentence,
     open_sentence,
     refused_sentence,
     sentence,
@@ -275,7 +278,7 @@ def parts(found: Validation) -> Iterator[RenderableType]:
             unreached=result.unreached,
         )
         yield escape(said)
-    if result.explanations:
+    if result.explanations and not nothing_to_explain(result.explanations):
         yield explanation_table(result.explanations[:_SHOWN])
     if result.fit is not None:
         yield _fit_table(result.fit)
@@ -313,6 +316,9 @@ def _answer(found: Validation) -> str:
         return escape(f"{name}: {says}. {beside} Without --limits there is no verdict.")
     left = open_sentence(result.criteria, result.devices)
     says += f"; {left}" if left else ""
+    if result.verdict is LimitVerdict.MET:
+        lasting = lasting_sentence(lasting_errors(of_both), explained=result.request.explain)
+        says += f"; {lasting}" if lasting else ""
     word = {"met": "MET", "not met": "NOT MET", "open": "OPEN"}[str(result.verdict)]
     return VerdictSentence(_GOOD[result.verdict], word, says).markup(name)
 

@@ -8,10 +8,11 @@ from orchestrator.core.errors import number_of
 from orchestrator.core.options import Option
 from orchestrator.linear.signals.identification import IdentifiedMode
 from orchestrator.studies.validation.beside import WindowApart
-from orchestrator.studies.validation.causes import CauseKind, Explanation
+from orchestrator.studies.validation.causes import CauseKind, Explanation, nothing_to_explain
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import EventComparison, JumpDoubt
 from orchestrator.studies.validation.fit import Fit, FittedParameter, Untold
+from orchestrator.studies.validation.lasting import LastingError
 from orchestrator.studies.validation.limits import Criterion, LimitVerdict, OpenCause
 from orchestrator.studies.validation.plain_part import PlainPart
 from orchestrator.studies.validation.questions import Question, QuestionKind
@@ -267,6 +268,23 @@ def error_sentence(comparisons: Sequence[EventComparison]) -> str:
     return text
 
 
+def lasting_sentence(errors: Sequence[LastingError], *, explained: bool) -> str:
+    """Say that errors within the limits are no noise, and what looks for their cause; empty where there are none.
+
+    ``explained``: whether that was asked for already."""
+    if not errors:
+        return ""
+    worst, more = errors[0], len(errors) - 1
+    part = "" if worst.part is None else f", {worst.part:.0%} of its swing (rms)"
+    others = f", and {number_of(more, 'signal')} more" if more else ""
+    hint = "" if explained else f": type {Option.EXPLAIN}, which looks for the cause"
+    return (
+        f"within the limits, but clearly more than the recording's noise, is the error of {worst.signal.upper()} after "
+        f"the event of {worst.recording}: {worst.mean:+.2g} pu in the mean, {worst.usual:.2g} pu in magnitude{part}"
+        f"{others}{hint}"
+    )
+
+
 def yardstick_sentence(comparisons: Sequence[EventComparison]) -> str:
     """Lay the errors of the worst event beside its own swing and beside what the recording leaves open."""
     one = worst_of(comparisons)
@@ -395,6 +413,8 @@ def explanation_cells(one: Explanation) -> tuple[str, ...]:
 def _likely(one: Explanation) -> str:
     if one.outdone:
         return "no: another leaves clearly less"
+    if one.hardly_beyond:
+        return "no: the error is hardly more than noise"
     return "yes" if one.explains else "no"
 
 
@@ -410,6 +430,9 @@ def explanation_sentence(
 
     ``finished``: whether all causes were tried; ``in_step``: whether the model was held in step for them; ``plain``: up
     to where the first one holds without that; ``unreached``: limits beside it that the model does not reach with it."""
+    if nothing_to_explain(explanations):
+        said = _said_of_noise(explanations[0])
+        return said if finished else f"Interrupted before all causes were tried. {said}"
     said = _said_of_causes(explanations, in_step=in_step)
     if in_step:
         said += f" {_HELD}"
@@ -421,6 +444,15 @@ def explanation_sentence(
             "that is right."
         )
     return said if finished else f"Interrupted before all causes were tried. {said}"
+
+
+def _said_of_noise(one: Explanation) -> str:
+    """Say that there is nothing to explain, and lay the error beside the recording's own noise."""
+    return (
+        f"There is nothing to explain: without what the voltage's jumps between samples make, the error is "
+        f"{one.error:.3g} pu (rms), hardly more than the recording's own noise of {one.noise:.3g} pu. No cause is "
+        "likely."
+    )
 
 
 def _plainly(part: PlainPart) -> str:

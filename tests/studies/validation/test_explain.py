@@ -281,6 +281,36 @@ def test_a_rest_above_the_scatter_is_told_with_what_looks_for_a_second_cause():
     assert "second cause" not in explanation_sentence([late])
 
 
+def test_an_error_that_is_noise_has_no_cause_and_one_clearly_beyond_it_has():
+    """Figures of a right model, whose filter was accused with 100 %, and of a wrong droop (0.0005 pu is little)."""
+    noise = Explanation(
+        CauseKind.VALUE, "filter.X_c", "pu", 0.15, 0.06383, 2.581e-4, 2.363e-4, noise=2.431e-4
+    )
+    assert noise.share > 0.99
+    assert not noise.explains
+    said = explanation_sentence([noise])
+    assert said.startswith("There is nothing to explain")
+    assert "X_c" not in said
+    little = replace(noise, error=3.3e-4, left=2.35e-4, noise=2.1e-4)  # less than a third goes away
+    assert little.share > 0.75
+    assert not little.explains
+    assert explanation_sentence([little]).startswith("There is nothing to explain")
+    wrong = replace(noise, name="droop.R_f", error=5.2e-4, left=2.2e-4, noise=1.9e-4)
+    assert wrong.explains
+    assert explanation_sentence([wrong]).startswith("The likeliest cause is droop.R_f")
+
+
+def test_no_cause_is_likely_beside_a_right_model():
+    """With this noise a filter's reactance, a droop's time and a resistance explained 70 to 100 %."""
+    frame = with_noise(table(run(stop=6.0)), seed=11).set_index("time")
+    found = gfor_in_python.validate("gfor", frame, values=ON, explain=True)
+    causes = found.result.explanations
+    assert causes[0].share > 0.9
+    assert not any(one.explains for one in causes)
+    assert "There is nothing to explain" in found.html()
+    assert "X_c" not in found.html()
+
+
 def test_a_cause_beside_another_is_not_said_to_be_all():
     """What one value leaves is counted in scatters of the recording; two ways to one value are one cause."""
     alone = Explanation(CauseKind.VALUE, "pod_p.K", "pu", 200.0, 120.0, 0.04, 0.0009, noise=0.0006)
