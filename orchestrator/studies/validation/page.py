@@ -183,7 +183,7 @@ def _fit(result: ValidationResult) -> str:
         interval_head(fit),
         "Can the recordings tell it?",
     ]
-    kept = [one.recording for one in result.confirmations if not one.fitted]
+    kept = {one.recording: one.agrees for one in result.confirmations if not one.fitted}
     said = f"<p>{escape(fit_sentence(fit, kept))}</p>"
     checks = confirmation_table(result.confirmations).html()
     return table("Fitted parameters", columns, rows) + said + checks

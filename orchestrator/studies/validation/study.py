@@ -46,6 +46,10 @@ from orchestrator.studies.validation.words import sentence
 
 Report = Callable[[str], None]
 
+_LITTLE = 0.1  # part of the squared error by which a fit has to lower it, to be confirmed
+_AGREES = 0.5  # part of that, by which an event that was kept back agrees
+_AS_NOISE = 2.0  # times the recording's own noise, up to which an error needs no fall
+
 
 @dataclass(frozen=True)
 class GivenRecording:
@@ -83,6 +87,8 @@ class FitCheck:
     fitted: bool  # False for an event that was kept back
     before: float
     after: float
+    scatter: float = 0.0  # that the recording's noise alone makes
+    agrees: bool | None = None  # of an event that was kept back; None where the fit changes little
 
     def as_json(self) -> dict[str, Any]:
         return {
@@ -90,7 +96,26 @@ class FitCheck:
             "fitted": self.fitted,
             "rms_before_pu": self.before,
             "rms_after_pu": self.after,
+            "agrees": self.agrees,
         }
+
+
+def with_agreement(checks: Sequence[FitCheck]) -> list[FitCheck]:
+    """The checks with whether the events that were kept back agree with a fit.
+
+    The squared error of such an event falls by half of the part at least by which that of the fitted ones falls, or to
+    what is hardly more than its noise."""
+    fitted = [one for one in checks if one.fitted]
+    before = sum(one.before**2 for one in fitted)
+    fall = 1 - sum(one.after**2 for one in fitted) / before if before > 0 else 0.0
+    if fall < _LITTLE:
+        return list(checks)
+    return [one if one.fitted else replace(one, agrees=_agrees(one, fall)) for one in checks]
+
+
+def _agrees(one: FitCheck, fall: float) -> bool:
+    own_fall = 1 - (one.after / one.before) ** 2 if one.before > 0 else 0.0
+    return own_fall >= _AGREES * fall or one.after <= _AS_NOISE * one.scatter
 
 
 @dataclass(frozen=True)
@@ -326,9 +351,11 @@ def add_fit(result: ValidationResult, report: Report) -> ValidationResult:
     for one, held in zip(result.comparisons, kept, strict=True):
         event = one.event
         after = other.play(event.recording, event.start).power if fit.values else one.played.power
-        errors = [math.hypot(*rms_error(power, event)) for power in (one.played.power, after)]
-        confirmations.append(FitCheck(event.recording.label, not held, *errors))
-    return replace(result, fit=fit, confirmations=confirmations)
+        was, now = (math.hypot(*rms_error(power, event)) for power in (one.played.power, after))
+        scatter = math.hypot(*(one.noise[signal].scatter for signal in ("p", "q")))
+        label = event.recording.label
+        confirmations.append(FitCheck(label, not held, was, now, scatter))
+    return replace(result, fit=fit, confirmations=with_agreement(confirmations))
 
 
 def _compare(device: PlayedDevice, event: RecordedEvent, bases: PortBases) -> EventComparison:

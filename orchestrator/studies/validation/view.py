@@ -284,7 +284,9 @@ def parts(found: Validation) -> Iterator[RenderableType]:
         yield _fit_table(result.fit)
         yield confirmation_table(result.confirmations)
         yield escape(
-            fit_sentence(result.fit, [c.recording for c in result.confirmations if not c.fitted])
+            fit_sentence(
+                result.fit, {c.recording: c.agrees for c in result.confirmations if not c.fitted}
+            )
         )
     elif result.request.fit and result.interrupted:
         yield "Interrupted before a fit had any values: the figures above are of the recordings alone."

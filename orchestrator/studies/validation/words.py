@@ -321,7 +321,8 @@ _WHY_OPEN = {
     OpenCause.STEP: "the device sees a jump of the voltage only at the begin of its step",
     OpenCause.FIXED_STEP: "the device sees a jump of the voltage only at the begin of its step, and refuses a "
     "shorter one",
-    OpenCause.RING_DOWN: "seen from a little later on, or by a model of another order, the ring-down has another mode",
+    OpenCause.RING_DOWN: "seen from a little later on, or by a model of another order, the ring-down has another mode; "
+    "no option decides it, and a recording that shows more of the swing may",
     OpenCause.NO_FIGURE: "the recording shows none",
     OpenCause.NO_SUCH_MODE: "the plant rings with a mode that the model does not show",
 }
@@ -571,8 +572,17 @@ def interval_head(fit: Fit) -> str:
     return "95 %" if fit.holds else "95 %, does not hold"
 
 
-def fit_sentence(fit: Fit, kept_back: Sequence[str]) -> str:
-    """Say on what a fit rests, and if an event that it did not see confirms it."""
+_AGREEMENT = {
+    True: "agrees with it",
+    False: "does NOT agree with it: with the fitted values its error falls by far less",
+    None: "tells nothing of it: the fit lowers the error by too little",
+}
+
+
+def fit_sentence(fit: Fit, kept_back: Mapping[str, bool | None]) -> str:
+    """Say on what a fit rests, and if an event that it did not see confirms it.
+
+    ``kept_back``: whether each such event agrees; None where the fit changes too little to tell."""
     seen = ", ".join(fit.fitted_to)
     said = f"Fitted to {seen} in {fit.runs} runs"
     if not fit.finished:
@@ -585,6 +595,9 @@ def fit_sentence(fit: Fit, kept_back: Sequence[str]) -> str:
             "what drove the plant. The intervals do not hold then: start elsewhere, with --set"
         )
     if kept_back:
-        return f"{said}; {', '.join(kept_back)} was kept back from it, and the table says whether it agrees."
+        words = [
+            f"{name} was kept back, and {_AGREEMENT[word]}" for name, word in kept_back.items()
+        ]
+        return f"{said}; {'; '.join(words)}."
     said += "; no other event confirms it: give one with --hold-back."
     return f"{said} Intervals hold if the model has the right form." if fit.holds else said
