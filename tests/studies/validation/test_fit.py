@@ -119,6 +119,7 @@ def test_an_event_that_is_kept_back_confirms_the_fit(gfor, recording, tmp_path):
     assert (fitted["fitted"], held["fitted"]) == (True, False)
     assert held["recording"] == str(kept)
     assert held["rms_after_pu"] < 0.2 * held["rms_before_pu"]
+    assert held["agrees"] is True
 
 
 def test_an_interrupted_fit_keeps_the_best_values_so_far(recording):
