@@ -40,6 +40,10 @@ _UNTOLD_GAIN = 0.02
 """Independent scatters by which a run of a fit lowers the squares at least: by less, no value moves by a seventh of its
 scatter, and the fit ends. Beside a device near its limit, voltages between samples creep on for many runs."""
 
+_NO_SLOPE = float(np.finfo(np.float64).eps)
+"""Slope of the squares below which there is none, and nothing to follow: where a device does not run, all errors are
+alike. The least that SciPy takes; any other slope is larger by far."""
+
 _REACHED = 3.0  # rms error in scatters: a larger one is the model's, or a fit that ended elsewhere
 _MOST_RUNS = 60  # of the residuals in one fit, beside those of the sensitivities
 _COARSE = (
@@ -396,7 +400,7 @@ def _stage_end(
             bounds=(low, high),
             xtol=stage.tolerance,
             ftol=max(stage.tolerance, _untold_part(residuals, values(at))),
-            gtol=None,
+            gtol=_NO_SLOPE,
             max_nfev=_MOST_RUNS,
         ).x
     )

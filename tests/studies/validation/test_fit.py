@@ -1,6 +1,7 @@
 """Parameters that made a recording are found again, and what it cannot tell is named."""
 
 import json
+import warnings
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -198,6 +199,42 @@ def test_a_fit_ends_where_no_value_moves_any_more_by_what_it_is_uncertain(monkey
         scatter = 1 / np.sqrt(float(errors.way @ errors.way))
         assert abs(best.values["K"] - exact) < scatter / 7
     assert runs[0.02] < 0.7 * runs[0.0]
+
+
+class RefusingErrors:
+    """Errors of a device that does not run from any value on: all are alike, and have no slope."""
+
+    hidden = ()
+    stretches = (
+        SimpleNamespace(
+            rows=np.arange(200),
+            event=SimpleNamespace(recording=SimpleNamespace(interval=1e-3)),
+        ),
+    )
+
+    def __init__(self):
+        self.rough = self
+
+    def at(self, values):
+        return np.full(400, 1e3)
+
+    def slopes(self, values, steps, *, both_sides=True):
+        return np.zeros((400, len(steps)))
+
+    def hidden_slopes(self, values):
+        return np.empty((400, 0))
+
+    def report(self, text):
+        pass
+
+
+def test_a_start_from_which_no_device_runs_ends_there_without_a_warning():
+    best = fit._Best()
+    begin = [Adjustable("I_max", "pu", start=0.5, low=0.0, high=10.0)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fit._least_squares(RefusingErrors(), begin, {}, best)
+    assert best.values == {"I_max": 0.5}
 
 
 @pytest.mark.slow
