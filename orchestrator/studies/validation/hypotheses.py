@@ -48,7 +48,7 @@ _AS_GOOD = 1.15  # times the least error left, up to which the reading that come
 _BEFORE = 1.0  # part of a recording before the event with which readings are tried [s]
 _AFTER = 3.0  # part after its begin, the same [s]
 _LEAVES = 0.25  # part of the error that another scale may leave: parameters change a size as well
-_FOLLOWS = 0.5  # part of the movement that the right unit of the times leaves at most: a device at rest leaves all
+_FOLLOWS = 0.25  # part of the movement that the right unit of the times leaves at most: a device at rest leaves all
 _LEAVES_ALONE = (
     0.12  # the same of a meter that stands alone beyond a transformer: wrong reactances are like it
 )
@@ -69,6 +69,9 @@ _PROMISES = 0.5  # part of the error that a straight line may leave, for a run t
 _UNITS_OF_TIME = {"min": 60.0, "ms": 1e-3, "us": 1e-6, "h": 3600.0, "d": 86400.0}
 _INTERVALS = 1e-4, 0.2  # between samples of a recording that shows an event [s]
 _LENGTHS = 0.5, 1200.0  # of such a recording [s]
+_OFF_WHOLE = 0.1, 1e-3
+"""By how much samples a second may be off a whole number: as rounded times make, and as a part of them."""
+
 _LEAST_CLOCK = 0.004  # delay [s] that is named, and at least
 _SAMPLES_CLOCK = 0.6  # so many samples
 _ALIKE = 0.25  # part by which the delays of P and Q may differ and be one clock's
@@ -477,6 +480,8 @@ def _time_unit(comparison: EventComparison, bases: PortBases, error: float) -> I
             _INTERVALS[0] <= interval <= _INTERVALS[1] and _LENGTHS[0] <= length <= _LENGTHS[1]
         ):
             continue
+        if _is_whole(1 / whole.interval) and not _is_whole(1 / interval):
+            continue  # 1000 samples a second are no 16.67 of minutes
         timed = replace(whole, interval=interval, begin=seconds * whole.begin)
         left, moved = math.inf, 0.0
         with comparison.device.trials.trial(f"times in {unit}"):
@@ -489,6 +494,11 @@ def _time_unit(comparison: EventComparison, bases: PortBases, error: float) -> I
             figures |= {"error": error, "left": left, "remedy": f"time=time in {unit}"}
             yield Question(QuestionKind.TIME_UNIT, figures)
             return
+
+
+def _is_whole(rate: float) -> bool:
+    """Return whether so many samples a second are a whole number, as recorders take them."""
+    return round(rate) > 0 and abs(rate - round(rate)) <= _OFF_WHOLE[0] + _OFF_WHOLE[1] * rate
 
 
 def _rated_otherwise(comparison: EventComparison, error: float) -> Iterator[tuple[float, Question]]:

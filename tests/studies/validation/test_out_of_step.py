@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 import orchestrator as gfor_in_python
-from tests.studies.validation.recordings import with_noise
+from orchestrator.studies.validation.hypotheses import _is_whole
+from tests.studies.validation.recordings import table, with_noise
 
 STEP = "200 us"
 PLANT = {"pod_p.enabled": True, "pod_p.K": 60.0}
@@ -58,3 +59,23 @@ def test_the_gain_that_makes_a_model_fall_is_named_with_the_plants(recorded):
     best, *_ = validated(recorded, MODEL, explain=True).result.explanations
     assert best.name == "pod_p.K"
     assert best.value == pytest.approx(60, rel=0.05)
+
+
+def test_a_model_without_the_plants_limit_makes_no_minutes_of_seconds():
+    """It is off by two ratings at the end; a run at rest in 240 s leaves 0.3 pu, which explains nothing."""
+    fault = {"time": 1.0, "component": "grid", "type": "bus_fault", "bus": "bus_2"}
+    case = gfor_in_python.load("two_area").with_(
+        events=[fault | {"X": 0.004, "duration": 0.1}],
+        solver={"record_interval": "1 ms", "record_filter": "low-pass"},
+    )
+    limited = {"gfor.current_limit.kind": 3, "gfor.current_limit.I_max": 1.002}
+    frame = with_noise(table(case.scenario("pod_p", limited).run(stop=4.0).dataset))
+    assert "time unit" not in kinds(validated(frame, {"pod_p.enabled": True}))
+
+
+@pytest.mark.parametrize(
+    ("rate", "whole"), [(1000.0, True), (50.05, True), (16.67, False), (1 / 60, False)]
+)
+def test_a_recorder_takes_a_whole_number_of_samples_a_second(rate, whole):
+    """50.05 a second: times in minutes with six decimals, 20 ms apart."""
+    assert _is_whole(rate) is whole
