@@ -50,6 +50,7 @@ class CauseKind(StrEnum):
     DELAY = "delay"
     LIMIT = "limit"
     PAIR = "pair"
+    LAG = "lag"
 
 
 @dataclass(frozen=True)
@@ -102,8 +103,8 @@ class Explanation:
 
     @property
     def values(self) -> dict[str, float | bool]:
-        """Values with which a device has this cause; empty for a delay, and for a limit that no parameter has."""
-        if self.cause in (CauseKind.DELAY, CauseKind.LIMIT):
+        """Values with which a device has this cause; empty for a delay, a lag, and a limit that no parameter has."""
+        if self.cause in (CauseKind.DELAY, CauseKind.LIMIT, CauseKind.LAG):
             return {}
         return {self.name: self.value, **self.beside}
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from scipy.linalg import solve_banded
 
 from orchestrator.core.arrays import Complex, Numbers
+from orchestrator.studies.validation.causes import CauseKind, Explanation
 from orchestrator.studies.validation.event import EventComparison, rms_error
 from orchestrator.studies.validation.questions import Question, QuestionKind
 
@@ -19,6 +20,13 @@ _LEAST = 5e-4  # rms error of a signal [pu] below which nothing is told from it
 _BEYOND = 2.0  # times the scatter before the event, by which the error is larger
 _EXPLAINS = 0.35  # part of the error that a lag may leave, to be named
 _PART = 0.05  # part of a signal's movement by which it is off at least
+_TO_NOISE = (
+    1.5  # times the scatter before the event, which a lag leaves that explains all of an error
+)
+_NEARLY_ALL = 0.1  # part of the error that it leaves then at most
+_ALIKE = (
+    0.1  # part by which the lags of several recordings differ at most, of one recorder or plant
+)
 
 
 def ask_of_lag(comparison: EventComparison) -> Iterator[tuple[float, Question]]:
@@ -29,6 +37,49 @@ def ask_of_lag(comparison: EventComparison) -> Iterator[tuple[float, Question]]:
             yield from found
             if found:
                 return
+
+
+def lag_alone(comparisons: Sequence[EventComparison]) -> Explanation | None:
+    """The lag that explains every event to the recording's noise, as a cause; None where there is more, or none.
+
+    A parameter acts in loops, and P or Q are not behind their own by it to the noise."""
+    found = [
+        one
+        for comparison in comparisons
+        for question in comparison.questions
+        if question.kind is QuestionKind.LAGGED
+        for one in _as_cause(comparison, question)
+    ]
+    if not found or len(found) < len(comparisons):
+        return None
+    first = max(found, key=lambda one: one.error)
+    same = all(
+        one.name == first.name and abs(one.value - first.value) <= _ALIKE * first.value
+        for one in found
+    )
+    return first if same else None
+
+
+def _as_cause(comparison: EventComparison, question: Question) -> Iterator[Explanation]:
+    """The lag that a question names, where it leaves noise alone, and no other signal is off."""
+    signals: list[str] = question.figures["signals"]
+    noise = math.hypot(*(comparison.noise[name].scatter for name in signals))
+    error, left = float(question.figures["error"]), float(question.figures["left"])
+    others = [name for name in ("p", "q") if name not in signals]
+    explained = left <= min(_TO_NOISE * noise, _NEARLY_ALL * error)
+    if explained and not any(_is_off(comparison, name) for name in others):
+        which = " and ".join(name.upper() for name in signals)
+        lag = float(question.figures["lag"])
+        yield Explanation(
+            CauseKind.LAG,
+            f"lag of {which}",
+            "s",
+            now=0.0,
+            value=lag,
+            error=error,
+            left=left,
+            noise=noise,
+        )
 
 
 def _is_off(comparison: EventComparison, name: str) -> bool:

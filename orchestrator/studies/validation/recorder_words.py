@@ -252,8 +252,9 @@ def _lagged(x: Figures) -> str:
     follows = "follow" if len(x["signals"]) > 1 else "follows"
     return (
         f"{which} {follows} the model's like one behind a lag of {1000 * x['lag']:.3g} ms, and beside that "
-        f"{fall_of_error(x)}: does the recorder filter it, or has the plant a lag that the model lacks? Give it as it "
-        "was measured, with " + Option.CHANNEL
+        f"{fall_of_error(x)}: does the recorder filter it, or has the plant a lag that the model lacks? No option "
+        f"takes a lag out: export {which} without the filter, or, if another column holds it so, give "
+        + " ".join(f"{Option.CHANNEL} '{one}=COLUMN'" for one in x["signals"])
     )
 
 

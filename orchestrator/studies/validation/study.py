@@ -28,6 +28,7 @@ from orchestrator.studies.validation.event import (
 from orchestrator.studies.validation.explain import explain_errors
 from orchestrator.studies.validation.fit import Fit, fit_parameters
 from orchestrator.studies.validation.hypotheses import question_readings, sign_that_starts
+from orchestrator.studies.validation.lagged import lag_alone
 from orchestrator.studies.validation.limits import (
     Criterion,
     LimitTables,
@@ -250,6 +251,9 @@ def _search_causes(
 
     What one parameter explains to the recording's scatter was no setpoint: a limit of the current that acts from a
     moment on looks like one at first."""
+    lag = lag_alone(comparisons)
+    if lag is not None:
+        return CauseSearch([lag])
     kept = [in_step(one) for one in comparisons]
     before = [before_setpoint(one) for one in comparisons]
     found = explain_errors(device, before, report, [before_setpoint(one) for one in kept])

@@ -473,16 +473,14 @@ def _plainly(part: PlainPart) -> str:
         )
     values = " and ".join(f"{name} = {value_text(x)}" for name, x in part.values.items())
     if part.to_end:
-        return (
-            f"Without that the model stays beside the plant to the end of {part.recording} with {values}, which leaves "
-            f"{leaves}: confirm it with {given}, and "
-            + Option.FIT
-            + f" {', '.join(part.values)} gives its interval."
-        )
+        stays = f"to the end of {part.recording} with {values}, which leaves {leaves}"
+        confirm = given
+    else:
+        stays = f"up to {part.until:.4g} s of {part.recording} with {values}, which leaves {leaves} up to there"
+        confirm = f"{given} {stop}"
     return (
-        f"Without that the model stays beside the plant up to {part.until:.4g} s of {part.recording} with {values}, "
-        f"which leaves {leaves} up to there: confirm it with {given} {stop}. An interval is not given: what the "
-        "voltage does between the samples moves the value by more than their noise."
+        f"Without that the model stays beside the plant {stays}: confirm it with {confirm}. An interval is not given: "
+        "what the voltage does between the samples moves the value by more than their noise."
     )
 
 
@@ -490,6 +488,11 @@ def _said_of_causes(explanations: Sequence[Explanation], *, in_step: bool) -> st
     if not explanations:
         return "No cause that was tried leaves less of the error."
     best = explanations[0]
+    if best.cause is CauseKind.LAG:
+        return (
+            f"The likeliest cause is {_cause(best)}: it explains {best.share:.0%} of the squared error beyond the "
+            "recording's own noise, and no parameter was tried beside it."
+        )
     if not best.explains:
         return (
             f"No cause by itself explains most of the error; the nearest is {_cause(best)}, with {best.share:.0%} of "
@@ -544,6 +547,9 @@ def _cause(one: Explanation) -> str:
             return f"{what} coming {abs(one.value):.3g} s {way} in the plant"
         case CauseKind.LIMIT:
             return f"a current that the plant limits to {one.value:.4g}{unit}"
+        case CauseKind.LAG:
+            which = one.name.removeprefix("lag of ")
+            return f"{which} behind a lag of {1000 * one.value:.3g} ms, which the question above asks about"
         case CauseKind.PAIR:
             others = [
                 f" together with {name} = {value_text(x)} (now {value_text(one.beside_now[name])})"

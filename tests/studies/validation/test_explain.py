@@ -4,13 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import orchestrator as gfor_in_python
 from orchestrator.studies.validation.cause_numbers import Promise, numbers_by_factors
 from orchestrator.studies.validation.causes import CauseKind, Explanation, without_worse_ways
 from orchestrator.studies.validation.hidden import HiddenPart
+from orchestrator.studies.validation.lagged import lag_alone
 from orchestrator.studies.validation.parameters import Adjustable
-from orchestrator.studies.validation.words import explanation_sentence
+from orchestrator.studies.validation.questions import QuestionKind
+from orchestrator.studies.validation.words import explanation_sentence, sentence
 from tests.studies.validation.recordings import run, table, with_noise
 
 ON = {"pod_p.enabled": True}
@@ -324,3 +327,34 @@ def test_a_cause_beside_another_is_not_said_to_be_all():
     assert alone.same_as(replace(alone, left=0.001))
     assert alone.same_as(beside)
     assert not alone.same_as(replace(alone, name="pod_p.T_W"))
+
+
+def behind_a_lag(frame, column, seconds=0.1):
+    part = 1e-3 / seconds
+    first = frame[column][0]
+    return frame.assign(**{column: lfilter([part], [1, part - 1], frame[column] - first) + first})
+
+
+def test_a_lag_that_leaves_noise_alone_is_the_cause_and_nothing_is_tried_beside_it():
+    noisy = with_noise(behind_a_lag(table(run("pod_p", stop=4.0)), "p_mw"))
+    found = gfor_in_python.validate(
+        "gfor", noisy.set_index("time"), values=ON, explain=True, step=STEP
+    ).result
+    (lag,) = found.explanations
+    assert (lag.cause, lag.name) == (CauseKind.LAG, "lag of P")
+    assert lag.value == pytest.approx(0.1, rel=0.05)
+    assert lag.values == {}
+    said = explanation_sentence(found.explanations)
+    assert said.startswith("The likeliest cause is P behind a lag of 1")
+    (asked,) = [sentence(one) for one in found.comparisons[0].questions]
+    assert asked.endswith(
+        "export P without the filter, or, if another column holds it so, give --channel 'p=COLUMN'"
+    )
+
+
+def test_a_lag_beside_a_wrong_parameter_is_not_all():
+    noisy = with_noise(behind_a_lag(table(run("pod_p", stop=4.0)), "p_mw"))
+    off = ON | {"droop.R_V": 0.05}
+    found = gfor_in_python.validate("gfor", noisy.set_index("time"), values=off, step=STEP).result
+    assert [one.kind for one in found.comparisons[0].questions] == [QuestionKind.LAGGED]
+    assert lag_alone(found.comparisons) is None

@@ -71,8 +71,9 @@ def test_a_value_that_holds_to_the_end_is_confirmed_there():
     assert part.confirms
     assert part.left < 0.2 * part.error
     said = explanation_sentence([right], in_step=True, plain=part)
-    assert "confirm it with --set droop.R_f=0.049, and --fit droop.R_f gives its interval" in said
+    assert "confirm it with --set droop.R_f=0.049. An interval is not given" in said
     assert "--stop" not in said
+    assert "--fit" not in said
 
 
 def test_what_takes_less_than_most_of_the_error_away_confirms_nothing():
