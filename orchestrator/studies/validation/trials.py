@@ -18,6 +18,11 @@ class RefusedTrial:
     kind: ErrorKind
     reason: str
 
+    @property
+    def began(self) -> bool:
+        """Return whether the device began at all: an operating point that it does not take is no trial of it."""
+        return self.kind is not ErrorKind.INPUT
+
     def as_json(self) -> dict[str, Any]:
         return {"tried": self.tried, "kind": str(self.kind), "reason": self.reason}
 

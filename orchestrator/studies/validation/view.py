@@ -290,8 +290,9 @@ def parts(found: Validation) -> Iterator[RenderableType]:
         )
     elif result.request.fit and result.interrupted:
         yield "Interrupted before a fit had any values: the figures above are of the recordings alone."
-    if result.refused and _is_doubted(result):
-        yield escape(refused_sentence(result.refused))
+    begun = [one for one in result.refused if one.began]
+    if begun and _is_doubted(result):
+        yield escape(refused_sentence(begun))
 
 
 def _is_doubted(result: ValidationResult) -> bool:
