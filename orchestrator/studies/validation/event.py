@@ -163,8 +163,14 @@ def cut_event(event: RecordedEvent, after: float, before: float = math.inf) -> R
         cut["sampled"] = whole.sampled[first:stop]
     earlier = first * whole.interval
     recording = replace(whole, begin=whole.begin + earlier, **cut)
-    begin, end = windows.begin - earlier, windows.end - earlier
-    moved = replace(windows, begin=begin, end=end, length=recording.length)
+    first_end = None if windows.first_end is None else windows.first_end - earlier
+    moved = replace(
+        windows,
+        begin=windows.begin - earlier,
+        end=windows.end - earlier,
+        length=recording.length,
+        first_end=first_end,
+    )
     return replace(event, recording=recording, windows=moved)
 
 

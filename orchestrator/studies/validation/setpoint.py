@@ -37,7 +37,8 @@ def ask_of_setpoint(recording: Recording, windows: Windows, simulated: Complex) 
     An error that shrinks is the end of a transient, in which the model was off. Figure ``stop``: the end of the part
     before, in which no mean over some time holds anything of the change [s]."""
     error = simulated - recording.power
-    first = int(np.searchsorted(recording.times, windows.end + _WITHIN))
+    event_end = windows.end if windows.first_end is None else windows.first_end
+    first = int(np.searchsorted(recording.times, event_end + _WITHIN))
     found = []
     for name, values in (("p", error.real), ("q", error.imag)):
         found += [*_steps(recording, name, values, first), *_ramps(recording, name, values, first)]

@@ -48,11 +48,15 @@ _STANDS_OUT = 3.0
 
 @dataclass(frozen=True)
 class Windows:
-    """Begin and end of an event, in seconds from the first sample; ``chosen``: whether the user gave them."""
+    """Begin and end of an event, in seconds from the first sample; ``chosen``: whether the user gave them.
+
+    ``first_end``: when its first change has ended, which a second, slower one may follow within the window; None if the
+    window's end is meant."""
 
     begin: float
     end: float
     length: float
+    first_end: float | None = None
     chosen: bool = False
     seen: bool = True  # whether the voltage shows an event
 
@@ -81,16 +85,16 @@ def find_windows(recording: Recording) -> Windows:
     for still in (_without_slope(recording.voltage, first), recording.power):
         found = _event(recording, still, first)
         if found is not None:
-            return Windows(*found, recording.length)
+            return found
     shortest = max(5, round(_SHORTEST_FIRST / recording.interval))
     for still in (_without_slope(recording.voltage, shortest), recording.power):
         found = _early_event(recording, still, shortest, first)
         if found is not None:
-            return Windows(*found, recording.length)
+            return found
     for still in (_without_slope(recording.voltage, first), recording.power):
         found = _slow_event(recording, still, first)
         if found is not None:
-            return Windows(*found, recording.length)
+            return found
     third = recording.length / 3
     return Windows(third, 2 * third, recording.length, seen=False)
 
@@ -117,7 +121,7 @@ def _lag(recording: Recording) -> int:
     return max(1, round(_LAG / recording.interval))
 
 
-def _event(recording: Recording, still: Complex, first: int) -> tuple[float, float] | None:
+def _event(recording: Recording, still: Complex, first: int) -> Windows | None:
     lag = _lag(recording)
     if len(still) < first + 2 * lag:
         return None
@@ -127,7 +131,7 @@ def _event(recording: Recording, still: Complex, first: int) -> tuple[float, flo
     if not len(abrupt):
         return None
     earliest = max(0, int(abrupt[0]) + lag - round(_BACK / recording.interval))
-    return _begin_and_end(recording, still, earliest, int(abrupt[0]) + lag, usual)
+    return _windows_of(recording, still, earliest, int(abrupt[0]) + lag, usual)
 
 
 def _least_change(change: Numbers) -> float:
@@ -137,9 +141,7 @@ def _least_change(change: Numbers) -> float:
     return float(np.clip(_OF_LARGEST * change.max(), _LEAST_IN_QUIET, _LEAST))
 
 
-def _early_event(
-    recording: Recording, still: Complex, shortest: int, first: int
-) -> tuple[float, float] | None:
+def _early_event(recording: Recording, still: Complex, shortest: int, first: int) -> Windows | None:
     """An event after at least ``shortest`` and at most ``first`` samples.
 
     Its change is beyond all that ended by a lag before it began: a swing or ramp grows too slowly for that."""
@@ -154,10 +156,10 @@ def _early_event(
     if not len(begins):
         return None
     steady = int(begins[0]) + lag  # samples that took part in the changes before
-    return _begin_and_end(recording, still, steady, steady + 2 * lag, float(before[begins[0]]))
+    return _windows_of(recording, still, steady, steady + 2 * lag, float(before[begins[0]]))
 
 
-def _slow_event(recording: Recording, still: Complex, first: int) -> tuple[float, float] | None:
+def _slow_event(recording: Recording, still: Complex, first: int) -> Windows | None:
     """An event that is nowhere abrupt, as a voltage that sinks for seconds or the begin of a swing."""
     for time in _SLOW:
         lag = max(1, round(time / recording.interval))
@@ -171,9 +173,7 @@ def _slow_event(recording: Recording, still: Complex, first: int) -> tuple[float
             begin = _bend(recording, still, (max(1, stop - 2 * lag), stop - 1), stop)
             if begin < first:  # what swings before as well is no event
                 continue
-            change = _changes(still, _lag(recording))
-            end = _end(still, begin, change, _lag(recording), recording.interval)
-            return recording.interval * begin, recording.interval * min(end, len(still) - 2)
+            return _windows_from(recording, still, begin)
     return None
 
 
@@ -209,9 +209,9 @@ def _changes(still: Complex, lag: int) -> Numbers:
     return np.abs(still[lag:] - still[:-lag])
 
 
-def _begin_and_end(
+def _windows_of(
     recording: Recording, still: Complex, earliest: int, stop: int, usual: float
-) -> tuple[float, float]:
+) -> Windows:
     """Begin between two samples, and the end [s]; ``usual``: the largest change over the lag before the event."""
     lag, interval = _lag(recording), recording.interval
     change = np.abs(still[lag:] - still[:-lag])
@@ -223,8 +223,24 @@ def _begin_and_end(
         low = begin - round((_LATE if is_seen else _BACK) / interval)
         low = max(low, min(begin, _first(recording)), 1)  # the first part is before any event
         begin = _bend(recording, still, (low, begin if is_seen else stop - 1), stop)
-    end = _end(still, begin, change, lag, interval)
-    return interval * begin, interval * min(end, len(still) - 2)
+    return _windows_from(recording, still, begin)
+
+
+def _windows_from(recording: Recording, still: Complex, begin: int) -> Windows:
+    """The windows of an event that begins at a sample."""
+    lag, interval, last = _lag(recording), recording.interval, len(still) - 2
+    change, after_dip = _changes(still, lag), _after_dip(still, begin, interval)
+    first_end = after_dip or _end_of_change(change, begin, lag, interval)
+    second = None if after_dip else _second_change(still, begin, interval)
+    end = first_end
+    if second is not None:
+        end = max(end, _end_of_change(change, second, lag, interval))
+    return Windows(
+        interval * begin,
+        interval * min(end, last),
+        recording.length,
+        first_end=interval * min(first_end, last),
+    )
 
 
 def _without_slope(signal: Complex, first: int) -> Complex:
@@ -261,16 +277,13 @@ def _abrupt_begin(change: Numbers, stop: int, lag: int, usual: float) -> int:
     return last if stop - last <= _GROWS * lag else 0
 
 
-def _end(still: Complex, begin: int, change: Numbers, lag: int, interval: float) -> int:
+def _after_dip(still: Complex, begin: int, interval: float) -> int | None:
+    """The first sample after a dip or swell; None where the magnitude has none."""
     magnitude = np.abs(still)
     usual = float(magnitude[: begin + 1].mean())
     within = slice(begin + 1, begin + 1 + round(_LONGEST_EVENT / interval))
     away = np.flatnonzero(np.abs(magnitude[within] - usual) > _EXCURSION)
-    if len(away):
-        return begin + 2 + int(away[-1])
-    end = _end_of_change(change, begin, lag, interval)
-    second = _second_change(still, begin, interval)
-    return end if second is None else max(end, _end_of_change(change, second, lag, interval))
+    return begin + 2 + int(away[-1]) if len(away) else None
 
 
 def _end_of_change(change: Numbers, begin: int, lag: int, interval: float) -> int:
