@@ -140,8 +140,22 @@ def _present_case_module(inside: str) -> str | None:
     return None
 
 
+_IMPORTERS = (__name__, f"{_HERE}.devices.fmi.brought_modules", "importlib._bootstrap")
+"""Modules between a line that imports and this one: the second while an FMU that brings modules lives."""
+
+
 def _notice(former: str, present: str) -> None:
-    warnings.warn(f"{former} is now {present}; import it there", DeprecationWarning, stacklevel=3)
+    frame = sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__name__") in _IMPORTERS:
+        frame = frame.f_back
+    warnings.warn_explicit(
+        f"{former} is now {present}; import it there",
+        DeprecationWarning,
+        frame.f_code.co_filename,
+        frame.f_lineno,
+        frame.f_globals.get("__name__"),
+        frame.f_globals.setdefault("__warningregistry__", {}),
+    )
 
 
 class _Room(ModuleType):

@@ -34,8 +34,12 @@ def guid_of(digest: str) -> str:
 
 
 def packed(contents: Mapping[str, bytes]) -> bytes:
-    """The archive of members given by path: the same bytes for the same members; large ones come first."""
-    kept = {name: content for name, content in contents.items() if len(content) in _KEPT}
+    """The archive of members given by path: the same bytes for the same members; an FMU's binaries come first."""
+    kept = {
+        name: content
+        for name, content in contents.items()
+        if name.startswith("binaries/") and len(content) in _KEPT
+    }
     other = {name: content for name, content in contents.items() if name not in kept}
     return _added(_packed_before(tuple(kept.items())), other)
 

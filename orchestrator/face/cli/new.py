@@ -25,7 +25,7 @@ from orchestrator.core.errors import (
     StartError,
     listing_all,
 )
-from orchestrator.core.options import Option, command
+from orchestrator.core.options import Option
 from orchestrator.core.safe_files import write_text
 from orchestrator.core.spelling import Text
 from orchestrator.devices.fmi.vendor_files import is_vendor_file
@@ -149,8 +149,11 @@ def _after_refusal(prepared: PreparedScenario, wanted: WantedCase) -> Text:
     if not limits:
         return text
     if len(limits) <= _MOST_TYPED:
-        values = [(Option.SET, f"{limit.name}={limit.taken:g}") for limit in limits]
-        text += "; it starts with " + command(f"modes {shlex.quote(str(wanted.out))}", *values)
+        values = [f"{Option.SET} {limit.name}={limit.taken:g}" for limit in limits]
+        text += (
+            "; it starts with "
+            + f"`gfor modes {' '.join([shlex.quote(str(wanted.out)), *values])}`"
+        )
     if not wanted.widen_limits:
         text += (
             "; to have these limits widened, and asked about, write it again with "

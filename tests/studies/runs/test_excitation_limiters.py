@@ -99,7 +99,8 @@ def test_modes_tell_of_an_operating_point_beyond_the_pickup_of_oel3c():
     values = {"sg1.oel": "oel3c", "sg1.oel.I_TFpu": 1.9}
     beyond, free = (compute_modes(prepared(x)) for x in (values, {}))
     (pickup,) = about_limiters(beyond.warnings)
-    assert "beyond the pickup of its limiter of overexcitation, oel.I_TFpu = 1.9" in pickup
+    assert "beyond the pickup of its limiter of overexcitation: E_fd = 2.04 pu" in pickup
+    assert "and oel.I_TFpu = 1.9; in PSS/E its time would run out" in pickup
     assert beyond.electromechanical is not None
     assert free.electromechanical is not None
     wanted = free.electromechanical.eigenvalue

@@ -122,7 +122,7 @@ def test_a_lost_mode_is_searched_for(lost, monkeypatch):
 def test_what_is_found_anew_is_the_same_by_a_search_and_among_all_eigenvalues(
     most_states, monkeypatch
 ):
-    here = system([*KNOWN, 0.02 + 4j])
+    here = system((*KNOWN, 0.02 + 4j))
     monkeypatch.setattr("orchestrator.studies.screening.modes.MOST_COUNTED", most_states)
     if most_states:
         monkeypatch.setattr("orchestrator.studies.screening.modes.find_critical_modes", None)
@@ -132,7 +132,9 @@ def test_what_is_found_anew_is_the_same_by_a_search_and_among_all_eigenvalues(
     assert len(held) == 6
     assert found.searched
     assert not found.looked_above
-    assert [found.modes.eigenvalues[k] for k in found.critical(REGION)] == pytest.approx(held)
+    critical = [found.modes.eigenvalues[k] for k in found.critical(REGION)]
+    # some have the same damping, and no order of their own
+    assert sorted(critical, key=np.imag) == pytest.approx(sorted(held, key=np.imag))
     assert found.growing_elsewhere == 0
 
 
