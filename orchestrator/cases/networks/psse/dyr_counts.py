@@ -4,18 +4,19 @@ GridPACK's reader takes as many values as a model has, passes over what follows,
 at the end (`parser_classes` and the models' `load`). What PSS/E says of either no public source tells. A machine's own
 record, and those of converters, whose fields differ from revision to revision, need all of their values."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 from fmus.toolchain.dyr_form import DyrField
-from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, number_in
 from orchestrator.cases.networks.psse.dyr_unit_records import RECORDS_OF_UNITS
+from orchestrator.cases.networks.psse.limiter_records import LIMITERS
 from orchestrator.cases.networks.psse.machine_model import ON_SHAFT
 from orchestrator.cases.networks.unit_row import DoubtOfRecord
 from orchestrator.core.errors import number_of
 
-_LIMITERS = ("oel", "uel")
-_OF_CONTROLS = ("exciter", "governor", "stabilizer", "compensator", *_LIMITERS)
+_OF_CONTROLS = ("exciter", "governor", "stabilizer", "compensator", *LIMITERS)
 _MAY_LACK = (*_OF_CONTROLS, "shaft", *ON_SHAFT)
 """Kinds of records whose last values may be missing."""
 
@@ -47,11 +48,7 @@ def _are_numbers(values: Sequence[str], fields: Sequence[DyrField]) -> bool:
     """Return whether a record's values are numbers, as they are not where it runs into the next one."""
     if any(field.is_text for field in fields):
         return False
-    try:
-        [float(text.upper().replace("D", "E")) for text in values]
-    except ValueError:
-        return False
-    return True
+    return not any(math.isnan(number_in(text)) for text in values)
 
 
 def doubt_of_count(record: DynamicRecord) -> DoubtOfRecord | None:

@@ -199,12 +199,17 @@ def given_values(
 
 def number_of_field(record: DynamicRecord, field: DyrField, text: str) -> float:
     """Return a field's number; an `InputError` where it is none."""
-    try:
-        value = float(text.upper().replace("D", "E"))
-    except ValueError:
-        value = math.nan
+    value = number_in(text)
     if not abs(value) < LARGEST:
         raise InputError.at(
             record.place, f"{record.name} has {field.name} = {text!r}; it must be a number"
         )
     return value
+
+
+def number_in(text: str) -> float:
+    """Return the number that a text is, as Fortran writes it too (1.5D-3); not a number where it is none."""
+    try:
+        return float(text.upper().replace("D", "E"))
+    except ValueError:
+        return math.nan

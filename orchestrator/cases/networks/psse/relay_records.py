@@ -10,9 +10,8 @@ Source: PowerWorld's guide to PSS/E's relay models; fields as InterPSS and GridP
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf
 
-from orchestrator.cases.networks.psse.dyr_file import NUMBERED, DynamicRecord
+from orchestrator.cases.networks.psse.dyr_file import NUMBERED, DynamicRecord, number_in
 from orchestrator.cases.networks.psse.refusals import Refusals
 from orchestrator.core.errors import InputError
 from orchestrator.core.units import LARGEST
@@ -84,10 +83,7 @@ def numbers_of(record: DynamicRecord, texts: Sequence[str]) -> list[float]:
     """Return the values of a record as numbers; an `InputError` at its line where one is none."""
     found = []
     for text in texts:
-        try:
-            value = float(text.upper().replace("D", "E"))
-        except ValueError:
-            value = inf
+        value = number_in(text)
         if not abs(value) < LARGEST:
             raise InputError.at(
                 record.place, f"{record.name} has the value {text!r}; it must be a number"
