@@ -257,9 +257,10 @@ def test_a_machine_that_is_asked_for_too_much_ends_at_its_thermal_limit(tmp_path
     assert [rows[k][1]["oel.acts"] for k in (0, 4, -1)] == [0, 0, 1]
 
 
+@pytest.mark.parametrize("oel", ["oel2c", "oel3c"])
 @pytest.mark.parametrize("name", ["sexs", "st1a", "ac1a"])
-def test_a_generator_with_it_starts_in_steady_state(name):
-    machine = Evaluated(synchronous_generator_phasor(exciter=name, oel="oel2c"), AT_BUS)
+def test_a_generator_with_it_starts_in_steady_state(name, oel):
+    machine = Evaluated(synchronous_generator_phasor(exciter=name, oel=oel), AT_BUS)
     assert not refused(machine)
     at = [BUS.real, BUS.imag]
     assert max(map(abs, machine.rates(at).values())) < 1e-8

@@ -5,11 +5,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from fmus.synchronous_generator.composed import synchronous_generator_phasor
 from fmus.synchronous_generator.parts import OELS
 from tests.models.one_machine import OneMachine, three_buses
-from tests.models.parts import AT_BUS, BUS, E_FD, integrated, limiter, refused
-from tests.support.evaluated import Evaluated
+from tests.models.parts import E_FD, integrated, limiter, refused
 
 REST = [E_FD, E_FD, 0.7, -0.1]
 STEP = 1e-3
@@ -182,12 +180,3 @@ def test_a_machine_that_is_asked_for_too_much_ends_at_its_pickup(tmp_path):
     assert field[0.0] < 2.1 < field[1.5]
     assert rows[-1][1]["E_fd"] == pytest.approx(1.05 / 0.5, rel=2e-3)
     assert [rows[k][1]["oel.acts"] for k in (0, 2, -1)] == [0, 0, 1]
-
-
-@pytest.mark.parametrize("name", ["sexs", "st1a", "ac1a"])
-def test_a_generator_with_it_starts_in_steady_state(name):
-    machine = Evaluated(synchronous_generator_phasor(exciter=name, oel="oel3c"), AT_BUS)
-    assert not refused(machine)
-    at = [BUS.real, BUS.imag]
-    assert max(map(abs, machine.rates(at).values())) < 1e-8
-    assert machine.outputs(at)["oel.acts"] == 0

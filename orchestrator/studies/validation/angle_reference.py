@@ -12,6 +12,7 @@ from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.studies.validation.filled import Mask
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.record import Recording
+from orchestrator.studies.validation.trend import PARTS_OF_TREND, trend_of
 from orchestrator.studies.validation.windows import Windows
 
 _OFFSET = 0.015  # error of P that stays [pu]
@@ -25,7 +26,7 @@ _LATE = 3  # the last so many-th part of what follows an event is its end
 _LONG_ENOUGH = 1.0  # time [s] of that end, in which a mean frequency holds little of a swing
 _ASKED = 0.015  # movement of the model before the event [pu] that its voltage makes
 _ANSWERS = 0.1  # part of it by which a plant answers at least
-_BLOCKS = 10  # means before the event, whose range is a movement
+_FEWEST = 10  # samples of which a mean is told
 
 
 def ask_of_swing_before(
@@ -35,7 +36,9 @@ def ask_of_swing_before(
     if not _may_be_asked(recording, windows):
         return []
     before = windows.part("before", recording.times) & recording.good
-    asked, seen = (_movement(power[before]) for power in (simulated, recording.power))
+    if before.sum() < PARTS_OF_TREND:
+        return []
+    asked, seen = (trend_of(power[before]) for power in (simulated, recording.power))
     if asked < _ASKED or seen > _ANSWERS * asked:
         return []
     return [Question(QuestionKind.ANGLE_REFERENCE, {"asked": asked, "seen": seen})]
@@ -52,7 +55,7 @@ def ask_of_lacking_frequency(
     before = windows.part("before", times) & recording.good
     late = (times > recording.length - third) & recording.good
     earlier = (times > recording.length - 2 * third) & recording.good & ~late
-    if third < _LONG_ENOUGH or min(before.sum(), earlier.sum(), late.sum()) < _BLOCKS:
+    if third < _LONG_ENOUGH or min(before.sum(), earlier.sum(), late.sum()) < _FEWEST:
         return []
     level, was, offset = (float(error[part].mean()) for part in (before, earlier, late))
     if abs(offset) < _OFFSET or was / offset < _STAYS or abs(level) > _RIGHT_BEFORE * abs(offset):
@@ -68,15 +71,6 @@ def _may_be_asked(recording: Recording, windows: Windows) -> bool:
     """Return whether there is an angle and an event, and the recording's own frequency has asked nothing."""
     asked = any(one.kind is QuestionKind.ANGLE_REFERENCE for one in recording.questions)
     return "angle" in recording.channels and windows.seen and not asked
-
-
-def _movement(power: Complex) -> float:
-    """The range of P's or Q's means over parts of a time, in which scatter counts little [pu of the rating]."""
-    width = max(1, len(power) // _BLOCKS)
-    means = power[: len(power) // width * width].reshape(-1, width).mean(axis=1)
-    if len(means) < _BLOCKS:
-        return 0.0
-    return float(max(np.ptp(means.real), np.ptp(means.imag)))
 
 
 def _frequency(recording: Recording, part: Mask) -> float:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.core.arrays import Numbers
+from orchestrator.core.arrays import Numbers, rms
 from orchestrator.studies.validation.event import EventComparison
 from orchestrator.studies.validation.filled import Mask
 
@@ -59,9 +59,9 @@ def models_apart(first: EventComparison, second: EventComparison) -> list[Window
                 recording.label,
                 window,
                 signal,
-                first=_rms(one - seen),
-                second=_rms(other - seen),
-                apart=_rms(one - other),
+                first=rms(one - seen),
+                second=rms(other - seen),
+                apart=rms(one - other),
                 largest=float(np.abs(one - other).max()),
             )
             found.append(row)
@@ -70,7 +70,3 @@ def models_apart(first: EventComparison, second: EventComparison) -> list[Window
 
 def _inside(signals: Mapping[str, Numbers], name: str, part: Mask) -> Numbers:
     return np.asarray(signals[name][part])
-
-
-def _rms(values: Numbers) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -35,6 +35,7 @@ from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.record import PortBases, Recording, questions_of_level
 from orchestrator.studies.validation.setpoint import ask_of_setpoint, without_step
 from orchestrator.studies.validation.smoothed import ask_of_smoothing
+from orchestrator.studies.validation.trend import trend_of
 from orchestrator.studies.validation.windows import Windows, find_windows
 
 _SHORTEST_BEFORE = 0.1  # a window before the event [s] that shows a steady state
@@ -190,7 +191,7 @@ def _of_windows(recording: Recording, windows: Windows, before: Mask) -> list[Qu
     if windows.begin < _SHORTEST_BEFORE:
         found.append(Question(QuestionKind.SHORT_BEFORE, {"length": windows.begin}))
     elif windows.seen:
-        moves = _trend(recording, before)
+        moves = trend_of(recording.power[before])
         if moves > _MOVES_BEFORE or _swings_before(recording, windows, before, moves):
             found.append(Question(QuestionKind.NO_STEADY_STATE, {"moves": moves}))
     return found + _gaps(recording, windows)
@@ -250,20 +251,11 @@ def _slow_samples(comparison: EventComparison) -> list[Question]:
     return [Question(QuestionKind.SLOW_SAMPLES, figures)]
 
 
-def _trend(recording: Recording, before: Mask) -> float:
-    """Largest movement of P or Q before the event [pu], without what changes from sample to sample."""
-    most = 0.0
-    for values in (recording.power.real[before], recording.power.imag[before]):
-        width = max(1, len(values) // 10)
-        whole = values[: len(values) // width * width].reshape(-1, width).mean(axis=1)
-        most = max(most, float(np.ptp(whole)) if len(whole) > 1 else 0.0)
-    return most
-
-
 def _swings_before(recording: Recording, windows: Windows, before: Mask, moves: float) -> bool:
     """Return whether the movement before the event is much of that after it, as in a record that begins in a swing."""
     after = windows.part("after", recording.times)
-    most = _trend(recording, after | windows.part("during", recording.times))
+    during = windows.part("during", recording.times)
+    most = trend_of(recording.power[after | during])
     count = max(1, int(before.sum()) // 10)
     return moves > max(_LEAST_BEFORE, _PART_BEFORE * most) and moves > _SCATTERS * _scatter(
         recording, before

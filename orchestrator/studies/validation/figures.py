@@ -291,9 +291,14 @@ def _ring_downs(
     Both have the measured one's order: at an order of its own, each would have other modes. ``more``: how many
     exponentials are added to it; ``least``: how many it has at least."""
     curves = [_ringing(recording, values, windows) for values in signals]
-    order = 0 if curves[0] is None else max(least, order_of(curves[0]) + more)
+    order = _order(curves[0], more, least)
     measured, own = (_modes(recording, one, windows, order, identify) for one in curves)
     return measured, own
+
+
+def _order(curve: xr.DataArray | None, more: int = 0, least: int = 2) -> int:
+    """How many exponentials a ring-down has; 0 where there is none."""
+    return 0 if curve is None else max(least, order_of(curve) + more)
 
 
 def _same_modes(
@@ -438,8 +443,8 @@ def _shared_rings(
 ) -> list[ComparedMode]:
     """The strong modes of two signals that are nearly the same; empty where they are not."""
     measured, own = (_ringing(recording, values, windows) for values in signals)
-    mean = 0.5 * (signals[0] + signals[1])
-    modes, _ = _ring_downs(recording, (mean, mean), windows, identify=strongest_modes)
+    mean = _ringing(recording, 0.5 * (signals[0] + signals[1]), windows)
+    modes = _modes(recording, mean, windows, _order(mean), strongest_modes)
     if not modes or measured is None or own is None:
         return []
     both = np.asarray(measured.values), np.asarray(own.values)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.core.arrays import Matrix, Numbers
+from orchestrator.core.arrays import Matrix, Numbers, rms
 from orchestrator.core.late import optimize, stats
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import RecordedEvent
@@ -216,7 +216,7 @@ def fit_parameters(
     errors = residuals.at(values)
     best = _Trial(found.told, found.untold, found.switches, values, errors, slopes)
     numbers = _numbers(best, wanted, residuals)
-    if finished and _rms(best.errors) > max(_REACHED, _LEAVES * _rms(before)):
+    if finished and rms(best.errors) > max(_REACHED, _LEAVES * rms(before)):
         numbers = [_left_at_start(one) for one in numbers]
     parameters = [*_switches(best, searches, starts, residuals), *numbers]
     if not finished:
@@ -224,8 +224,8 @@ def fit_parameters(
     return Fit(
         parameters=parameters,
         fitted_to=[one.recording.label for one in events],
-        error_before=_rms(before),
-        error_after=_rms(best.errors),
+        error_before=rms(before),
+        error_after=rms(best.errors),
         runs=residuals.runs,
         finished=finished,
     )
@@ -250,7 +250,7 @@ def _begun(
     if told:
         return _Search(switches, told, untold, _starts(residuals, told, switches))
     errors = residuals.at(switches)
-    best = _Best(float(errors @ errors), _rms(errors), dict(switches))
+    best = _Best(float(errors @ errors), rms(errors), dict(switches))
     return _Search(switches, told, untold, iter(()), best)
 
 
@@ -266,10 +266,6 @@ def _slopes_of_all(residuals: Residuals, found: _Search) -> Matrix | None:
     values = found.best.values
     own = _slopes_inside(residuals, found.told, values)
     return np.column_stack([own, residuals.hidden_slopes(values)])
-
-
-def _rms(errors: Numbers) -> float:
-    return float(np.sqrt(np.mean(errors**2)))
 
 
 def _starts(
@@ -377,10 +373,10 @@ def _stage_end(
         found = residuals.at(given)
         cost = float(found @ found)
         if cost < best.cost:
-            best.cost, best.rms, best.values = cost, _rms(found), given
+            best.cost, best.rms, best.values = cost, rms(found), given
             said = ", ".join(f"{one.name} = {given[one.name]:.4g}" for one in told)
             residuals.report(
-                f"fit: rms error {_rms(found):.4g} times the recording's noise with {said}"
+                f"fit: rms error {rms(found):.4g} times the recording's noise with {said}"
             )
         return mean(found)
 

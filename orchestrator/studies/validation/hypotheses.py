@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from orchestrator.core.arrays import Complex, Numbers
+from orchestrator.core.arrays import Complex, Numbers, rms
 from orchestrator.core.options import Option
 from orchestrator.studies.validation.angle_reference import ask_of_lacking_frequency
 from orchestrator.studies.validation.causes import cap_of_current
@@ -399,9 +399,9 @@ class _Trial:
         length = max(_AT_ONCE, _FEWEST_AT_ONCE * recording.interval)
         first = (since > 0) & (since <= length) & recording.good
         least = _LEAST_OFF * max(self.reading.scales())
-        scatter = _NOISY * _rms(moved[before])
-        most = math.hypot(scatter, _MOST_AT_ONCE * _rms(moved[first]))
-        return _rms(error[before]) <= max(least, scatter) and _rms(error[first]) <= max(least, most)
+        scatter = _NOISY * rms(moved[before])
+        most = math.hypot(scatter, _MOST_AT_ONCE * rms(moved[first]))
+        return rms(error[before]) <= max(least, scatter) and rms(error[first]) <= max(least, most)
 
     def _as_read(self, power: Complex) -> Complex:
         """The part of a power that the reading is of: P, Q or both."""
@@ -410,10 +410,6 @@ class _Trial:
         if self.reading.roles == ("q",):
             return np.asarray(power.imag, dtype=complex)
         return power
-
-
-def _rms(values: Complex) -> float:
-    return float(np.sqrt(np.mean(np.abs(values) ** 2))) if len(values) else 0.0
 
 
 def _trials_of(

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.linalg import solve_banded
 
-from orchestrator.core.arrays import Complex, Numbers
+from orchestrator.core.arrays import Complex, rms
 from orchestrator.studies.validation.causes import CauseKind, Explanation
 from orchestrator.studies.validation.event import EventComparison, rms_error
 from orchestrator.studies.validation.questions import Question, QuestionKind
@@ -86,16 +86,12 @@ def _is_off(comparison: EventComparison, name: str) -> bool:
     event = comparison.event
     measured = comparison.measured[name]
     part = event.recording.good & (event.recording.times > event.windows.begin)
-    error = _rms((comparison.simulated[name] - measured)[part])
-    moved = _rms(
+    error = rms((comparison.simulated[name] - measured)[part])
+    moved = rms(
         measured[part] - measured[event.windows.part("before", event.recording.times)].mean()
     )
     least = max(_LEAST, _BEYOND * comparison.noise[name].scatter, _PART * moved)
     return error > least and comparison.beyond_doubt(name)
-
-
-def _rms(values: Numbers) -> float:
-    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
 
 
 def _explained(

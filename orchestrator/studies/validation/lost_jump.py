@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from orchestrator.core.arrays import Complex, Numbers
+from orchestrator.core.arrays import Complex, Numbers, rms
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import (
     EventComparison,
@@ -165,15 +165,11 @@ def _tried(
         good = recording.good
         size = float(np.sum(np.abs(moves[good]) ** 2))
         scale = float(np.real(np.vdot(moves[good], off[good]))) / size if size > 0 else 0.0
-        promised = _rms((off - scale * moves)[good])
-        if promised > _PROMISES * _rms(off[good]) or scale * smoothing.length < _SHORTEST:
+        promised = rms((off - scale * moves)[good])
+        if promised > _PROMISES * rms(off[good]) or scale * smoothing.length < _SHORTEST:
             return
         power = device.play(_sharper(recording, of, scale * lost), near.start).power
         yield math.hypot(*rms_error(power, near)), scale * smoothing.length, scale * lost
-
-
-def _rms(values: Complex) -> float:
-    return float(np.sqrt(np.mean(np.abs(values) ** 2)))
 
 
 def _sharper(recording: Recording, part: SmoothedPart, lost: Numbers) -> Recording:

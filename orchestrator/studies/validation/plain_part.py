@@ -11,7 +11,7 @@ what the voltage does between the samples moves the model by more than that nois
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -175,16 +175,7 @@ def _with_errors(found: PlainPart, bench: CauseBench) -> PlainPart:
         return found
     left = bench.errors(responses)
     error, rest = (float(np.sqrt(squares_of(one))) for one in (bench.error, left))
-    return PlainPart(
-        found.recording,
-        found.values,
-        found.until,
-        found.to_end,
-        found.shows,
-        error=error,
-        left=rest,
-        noise=bench.noise,
-    )
+    return replace(found, error=error, left=rest, noise=bench.noise)
 
 
 def _begin_of(event: RecordedEvent) -> float:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from orchestrator.core.arrays import Complex, Matrix, Numbers
+from orchestrator.core.arrays import Complex, Matrix, Numbers, rms
 from orchestrator.linear.signals.identification import IdentifiedMode
 from orchestrator.studies.validation.correlation import correlation_length
 
@@ -56,7 +56,7 @@ def shared_modes(
     residues = _residues(drift, list(swings.values()), 0.5 * (measured + simulated))
     own = [residues[list(swings).index(one)] * swings[one] for one in strong]
     difference = simulated - measured
-    if not own or _rms(difference - difference.mean()) > _SMALL * _rms(np.sum(own, axis=0).real):
+    if not own or rms(difference - difference.mean()) > _SMALL * rms(np.sum(own, axis=0).real):
         return []
     columns = [np.ones_like(since), since]
     for one, swing in zip(strong, own, strict=True):
@@ -83,10 +83,6 @@ def _residues(drift: Matrix, swings: Sequence[Complex], values: Numbers) -> Comp
     found, *_ = np.linalg.lstsq(np.column_stack(columns), values, rcond=None)
     sizes = found[drift.shape[1] :]
     return np.asarray(sizes[::2] + 1j * sizes[1::2])
-
-
-def _rms(values: Numbers) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _deviations(table: Matrix, rest: Numbers) -> Numbers:

@@ -125,7 +125,7 @@ def _event(recording: Recording, still: Complex, first: int) -> Windows | None:
     lag = _lag(recording)
     if len(still) < first + 2 * lag:
         return None
-    change = np.abs(still[lag:] - still[:-lag])
+    change = _changes(still, lag)
     usual = float(change[: max(1, first - lag)].max())
     abrupt = np.flatnonzero(change > max(_ABOVE * usual, _least_change(change)))
     if not len(abrupt):
@@ -214,7 +214,7 @@ def _windows_of(
 ) -> Windows:
     """Begin between two samples, and the end [s]; ``usual``: the largest change over the lag before the event."""
     lag, interval = _lag(recording), recording.interval
-    change = np.abs(still[lag:] - still[:-lag])
+    change = _changes(still, lag)
     begin = _begin(still, earliest, stop)
     if _scatter(still[: max(earliest, 3)]) > usual:
         begin = max(begin, _abrupt_begin(change, stop, lag, usual))

@@ -5,7 +5,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from orchestrator.core.arrays import Numbers
+from orchestrator.core.arrays import Numbers, rms
 from orchestrator.core.errors import ComponentError
 from orchestrator.devices.acceptance.checks.base import (
     SAME,
@@ -171,19 +171,15 @@ def _shift(fine: Numbers, coarse: Numbers, many: int) -> int:
     size, at = scales(fine, coarse), np.arange(1, len(coarse)) * many
     for column in range(fine.shape[1]):
         a, b = fine[:, column] / size[column], coarse[:, column] / size[column]
-        plain = _rms(b[1:] - a[at])
+        plain = rms(b[1:] - a[at])
         if plain < 1e-4:
             continue
         for count in range(1, _DELAYS + 1):
             lag = count * (many - 1)
             late = at[at - lag >= 0]
-            if len(late) > 3 and _rms(b[late // many] - a[late - lag]) < _CLEARLY * plain:
+            if len(late) > 3 and rms(b[late // many] - a[late - lag]) < _CLEARLY * plain:
                 return count
     return 0
-
-
-def _rms(values: Numbers) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _stale(subject: Subject, *, declared: bool) -> str | None:
