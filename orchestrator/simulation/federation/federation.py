@@ -5,6 +5,7 @@ gone, however that came about."""
 
 import json
 import pickle
+import socket
 import struct
 import subprocess
 import sys
@@ -35,9 +36,10 @@ from orchestrator.simulation.federation.frames import Door, Frames
 from orchestrator.simulation.federation.layout import (
     Layout,
     Part,
-    broker_port,
+    claim_ports,
     make_layout,
     require_broker,
+    require_free,
 )
 from orchestrator.simulation.federation.pace import Pace
 from orchestrator.simulation.waiting_times import AFTER_CTRL_C, HUB_GRACE, TO_END
@@ -64,6 +66,7 @@ class Federation(Closing):
         self._plans = {name: prepared.system.components[name] for name in self._parts}
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
         self._folder: Path | None = None
+        self._ports: socket.socket | None = None
         self._hub: Frames | None = None
         self._foreign: set[str] = set()
         self._published: dict[str, list[str]] = {}
@@ -90,7 +93,7 @@ class Federation(Closing):
     def _start(self) -> None:
         choice, own = self._choice, None
         if choice.broker is None:
-            port = broker_port(choice.port)
+            port = self._port_of_own()
             own, broker = (
                 {"port": port, "everywhere": choice.port is not None},
                 f"tcp://127.0.0.1:{port}",
@@ -138,6 +141,13 @@ class Federation(Closing):
                     "orchestrator.simulation.federation.federate",
                     f"{len(content)}\n".encode() + content,
                 )
+
+    def _port_of_own(self) -> int:
+        if self._choice.port is not None:
+            require_free(self._choice.port)
+            return self._choice.port
+        port, self._ports = claim_ports()
+        return port
 
     def _spawn(self, name: str, module: str, request: bytes) -> None:
         assert self._folder is not None
@@ -389,6 +399,8 @@ class Federation(Closing):
         self._processes = {}
         if hub is not None:
             hub.close()
+        if self._ports is not None:
+            self._ports.close()
         if self._folder is not None:
             temporary.remove(self._folder)
 

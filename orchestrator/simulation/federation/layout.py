@@ -1,5 +1,6 @@
 """Which values a federation exchanges, and when; times of HELICS are whole nanoseconds."""
 
+import random
 import socket
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -103,41 +104,53 @@ def make_layout(
     return Layout(period, slots, tuple(parts))
 
 
-_TRIES = 50
 _TO_CONNECT = 5.0  # how long a broker's address is tried [s]
+_LOCAL = "127.0.0.1"
+_BLOCK = (
+    128  # ports for one federation: its broker's first two, and from the sixth on one a federate
+)
+_BLOCKS = range(20_480, 32_768, _BLOCK)
+"""The ports of brokers: below those that Linux (from 32768), macOS and Windows (from 49152) give to whoever connects
+to somewhere. HELICS tells a federate its port without a look at it, and a federate whose port is taken gives up."""
+_HELD = 2  # a port of each block that HELICS leaves free
 
 
-def broker_port(wanted: int | None) -> int:
-    """The port of a broker that is about to be started; the one after it is free as well, which HELICS takes too."""
-    if wanted is not None:
-        taken = _take_port(wanted, "")
-        if taken is not None:
-            raise InputError(
-                Option.BROKER_PORT
-                + f" {wanted}: port {taken} is in use (a broker takes two ports, {wanted} and "
-                f"{wanted + 1}); give another port, or use the broker that runs there with "
-                + Option.BROKER
-            )
-        return wanted
-    for _ in range(_TRIES):
-        with socket.create_server(("127.0.0.1", 0)) as server:
-            port: int = server.getsockname()[1]
-        if port < 65000 and _take_port(port, "127.0.0.1") is None:
-            return port
+def claim_ports() -> tuple[int, socket.socket]:
+    """The port of a broker that is about to be started, and what keeps its block from our other federations."""
+    for port in random.sample(_BLOCKS, len(_BLOCKS)):
+        with ExitStack() as stack:
+            try:
+                held = stack.enter_context(socket.create_server((_LOCAL, port + _HELD)))
+            except OSError:
+                continue
+            others = (port + i for i in range(_BLOCK) if i != _HELD)
+            if all(_is_free(number, _LOCAL) for number in others):
+                stack.pop_all()
+                return port, held
     raise InputError(
-        "this machine has no two free ports one after the other for a broker; give "
-        "one with " + Option.BROKER_PORT
+        f"this machine has no {_BLOCK} free ports one after the other between {_BLOCKS.start} and "
+        f"{_BLOCKS.stop - 1} for a federation; give a port with " + Option.BROKER_PORT
     )
 
 
-def _take_port(port: int, host: str) -> int | None:
-    with ExitStack() as stack:
-        for number in (port, port + 1):
-            try:
-                stack.enter_context(socket.create_server((host, number)))
-            except (OSError, OverflowError):
-                return number
-    return None
+def require_free(port: int) -> None:
+    """Refuse the port of a broker that is about to be started if it, or the one after it, is in use."""
+    for number in (port, port + 1):
+        if not _is_free(number, ""):
+            raise InputError(
+                Option.BROKER_PORT
+                + f" {port}: port {number} is in use (a broker takes two ports, {port} and "
+                f"{port + 1}); give another port, or use the broker that runs there with "
+                + Option.BROKER
+            )
+
+
+def _is_free(port: int, host: str) -> bool:
+    try:
+        socket.create_server((host, port)).close()
+    except (OSError, OverflowError):
+        return False
+    return True
 
 
 def require_broker(broker: str) -> None:

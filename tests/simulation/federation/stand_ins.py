@@ -6,13 +6,14 @@ import time
 import helics as h
 
 PERIOD = 100e-6
+TO_WAIT = "--networktimeout=10s"  # HELICS tries six times: a minute for a broker that starts late
 
 
 def joined(broker, name="load"):
     info = h.helicsCreateFederateInfo()
     h.helicsFederateInfoSetCoreTypeFromString(info, "zmq")
     h.helicsFederateInfoSetCoreInitString(
-        info, f"--federates=1 --broker_address={broker} --loglevel=error"
+        info, f"--federates=1 --broker_address={broker} {TO_WAIT} --loglevel=error"
     )
     h.helicsFederateInfoSetFlagOption(info, h.HELICS_FLAG_UNINTERRUPTIBLE, True)
     return h.helicsCreateValueFederate(name, info)

@@ -12,6 +12,7 @@ import threading
 import time
 from contextlib import suppress
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,7 @@ from orchestrator.simulation.federation import frames
 from orchestrator.simulation.federation.choice import Federates
 from orchestrator.simulation.federation.component import FederatedComponent
 from orchestrator.simulation.federation.frames import JOIN, Door, Frames, call
-from orchestrator.simulation.federation.layout import broker_port, make_layout
+from orchestrator.simulation.federation.layout import claim_ports, make_layout
 from orchestrator.studies.runs.run import run_scenario
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.recorder import Recorder
@@ -101,19 +102,31 @@ def started(monkeypatch):
 
 
 @pytest.fixture
-def stand_in():
-    """Start a federate of others at the port of a broker."""
+def port():
+    """A port for a broker, which no federation of another worker takes meanwhile."""
+    number, held = claim_ports()
+    with held:
+        yield number
+
+
+@pytest.fixture
+def stand_in(tmp_path):
+    """Start a federate of others at the port of a broker; where the test fails, pytest shows what it said."""
     found = []
+    said = tmp_path / "stand_in.txt"
 
     def start(kind, port):
         words = [sys.executable, str(STAND_INS), kind, f"tcp://127.0.0.1:{port}"]
-        found.append(subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+        with said.open("wb") as file:
+            found.append(subprocess.Popen(words, stdout=file, stderr=file))
         return found[-1]
 
     yield start
     for process in found:
+        print("the stand-in", "was running" if process.poll() is None else process.returncode)
         process.kill()
         process.wait()
+        print(said.read_text(encoding="utf-8"))
 
 
 def assert_same(one, other):
@@ -163,8 +176,10 @@ def test_an_event_reaches_a_federate_at_once(prepared, temporary, started):
     assert np.ptp(local.dataset["load.y"].values) > 1.0
 
 
-def test_a_program_of_others_takes_a_component_s_place(prepared, stand_in, temporary, started):
-    ready, port = prepared(), broker_port(None)
+def test_a_program_of_others_takes_a_component_s_place(
+    prepared, port, stand_in, temporary, started
+):
+    ready = prepared()
     stand_in("gain", port)
     result = run_scenario(ready, federates=Federates(external=("load",), port=port))
     assert result.failure is None
@@ -211,8 +226,7 @@ def test_a_step_that_helics_cannot_keep(step_size, names, prepared):
         ),
     ],
 )
-def test_a_federate_with_other_names(kind, said, prepared, stand_in, temporary, started):
-    port = broker_port(None)
+def test_a_federate_with_other_names(kind, said, prepared, port, stand_in, temporary, started):
     stand_in(kind, port)
     with pytest.raises(InputError, match=said):
         run_scenario(prepared(), federates=Federates(external=("load",), port=port))
@@ -231,9 +245,9 @@ def test_a_federate_with_other_names(kind, said, prepared, stand_in, temporary, 
     ],
 )
 def test_a_federate_that_goes_wrong_keeps_what_was_recorded(
-    kind, error, said, prepared, stand_in, temporary, started
+    kind, error, said, prepared, port, stand_in, temporary, started
 ):
-    ready, port = prepared(), broker_port(None)
+    ready = prepared()
     stand_in(kind, port)
     choice = Federates(external=("load",), port=port, patience=2.0)
     result = run_scenario(ready, federates=choice)
@@ -284,28 +298,46 @@ def test_ctrl_c_keeps_what_was_recorded(prepared, temporary, started):
 
 
 @pytest.mark.parametrize("taken", [0, 1])
-def test_a_port_in_use(taken, prepared):
-    port = broker_port(None)
+def test_a_port_in_use(taken, prepared, port):
     said = rf"--broker-port {port}: port {port + taken} is in use"
     with socket.create_server(("127.0.0.1", port + taken)), pytest.raises(InputError, match=said):
         run_scenario(prepared(), federates=Federates(("load",), port=port))
 
 
-def test_no_broker(prepared):
+def test_federations_of_one_machine_take_no_port_of_each_other():
+    """Nor one of those that the machine gives to whoever connects to somewhere: HELICS looks at no federate's port."""
+    claimed = [claim_ports() for _ in range(20)]
+    ports = sorted(number for number, _ in claimed)
+    assert min(b - a for a, b in pairwise(ports)) >= 100
+    assert ports[-1] + 100 < 32_768
+    for _, held in claimed:
+        held.close()
+
+
+def test_a_block_of_ports_of_which_somebody_has_one_is_left_alone(monkeypatch):
+    first, free = (claim_ports() for _ in range(2))
+    for _, held in (first, free):
+        held.close()
+    monkeypatch.setattr("random.sample", lambda blocks, count: [first[0], free[0]])
+    with socket.create_server(("127.0.0.1", first[0] + 6)):  # the second federate's
+        port, held = claim_ports()
+    held.close()
+    assert port == free[0]
+
+
+def test_no_broker(prepared, port):
     with pytest.raises(InputError, match=r"nothing answers there.*helics_broker -f N"):
         run_scenario(
             prepared(),
-            federates=Federates(("load",), broker=f"tcp://127.0.0.1:{broker_port(None)}"),
+            federates=Federates(("load",), broker=f"tcp://127.0.0.1:{port}"),
         )
 
 
-def test_nobody_joins(prepared, temporary, started):
+def test_nobody_joins(prepared, port, temporary, started):
     with pytest.raises(
         InputError, match=r"no federate named 'load' joined the federation at .* within 4 s"
     ):
-        run_scenario(
-            prepared(), federates=Federates(external=("load",), port=broker_port(None), to_join=4.0)
-        )
+        run_scenario(prepared(), federates=Federates(external=("load",), port=port, to_join=4.0))
 
 
 def test_another_version(prepared, temporary, started, monkeypatch):
@@ -317,8 +349,7 @@ def test_another_version(prepared, temporary, started, monkeypatch):
         run_scenario(prepared(), federates=Federates(("load",)))
 
 
-def test_an_event_in_a_foreign_federate(prepared, stand_in, temporary, started):
-    port = broker_port(None)
+def test_an_event_in_a_foreign_federate(prepared, port, stand_in, temporary, started):
     stand_in("gain", port)
     with pytest.raises(
         InputError, match="'load' is a foreign federate, in which gfor can change nothing"
@@ -416,8 +447,8 @@ def _until(holds, seconds=60.0):
         time.sleep(0.1)
 
 
-def test_a_component_of_ours_that_was_started_by_hand(prepared, temporary, started):
-    ready, port = prepared(), broker_port(None)
+def test_a_component_of_ours_that_was_started_by_hand(prepared, port, temporary, started):
+    ready = prepared()
     words = [
         "master",
         "federate",
@@ -440,20 +471,20 @@ def test_a_component_of_ours_that_was_started_by_hand(prepared, temporary, start
     assert_same(run_scenario(ready).dataset, result.dataset)
 
 
-def test_a_federate_without_a_broker(gfor, prepared):
-    words = ("--component", "load", "--broker", f"tcp://127.0.0.1:{broker_port(None)}")
+def test_a_federate_without_a_broker(gfor, prepared, port):
+    words = ("--component", "load", "--broker", f"tcp://127.0.0.1:{port}")
     code, _, error = gfor("master", "federate", prepared().case.path, *words)
     assert code == 2
     assert "nothing answers there" in error
 
 
 @pytest.mark.slow
-def test_the_program_of_the_guide(tmp_path, temporary, started):
+def test_the_program_of_the_guide(tmp_path, port, temporary, started):
     """A constant admittance in the place of the converter: its current follows the voltage that it is given."""
     page = (Path(__file__).parents[3] / ".docs" / "how-to" / "federation.md").read_text(
         encoding="utf-8"
     )
-    program, port = tmp_path / "admittance.py", broker_port(None)
+    program = tmp_path / "admittance.py"
     program.write_text(re.search(r"```python\n(.*?)```", page, re.DOTALL)[1], encoding="utf-8")
     ready = prepare_one("two_area", "gfor", stop_time=0.02)
     flow = ready.values
