@@ -1,22 +1,26 @@
-"""Composite loads of CMLDBLU2 (WECC's CMPLDW), approximated: motors A to C, and the rest as a load with a law.
+"""Composite loads of CMLDBLU1 and CMLDBLU2 (WECC's CMPLDW), approximated: motors A to C, and the rest as a load with a
+law.
 
 Each of the motors A to C with three phases is an induction machine with the record's reactances and time constants, and
-draws its share of the load's P and Q; a susceptance is beside it. Motor D, which is an air conditioner's, and the
-electronic load draw constant powers; the static load follows its exponents and its frequency. Left out: the
-transformer and the feeder before the load, tripping and stalling, and what distributed generation the record has.
+draws its share of the load's P and Q; a susceptance is beside it. Motor D is air conditioners while they run
+(`air_conditioners`), the electronic load draws constant powers, and the static load follows its exponents and its
+frequency. Left out: the transformer and the feeder before the load, tripping and stalling, and what distributed
+generation the record has.
 
 Source: WECC, "Composite Load Model for Dynamic Simulations" (2012); the order of the fields as parsers of PSS/E's files
-have it (InterPSS; a public script that writes such records)."""
+have it (InterPSS, and GridPACK for CMLDBLU1; a public script that writes both)."""
 
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import isnan
 
-from fmus.grid.element_data import Load, Zip
+from fmus.grid.element_data import LAWS, Load, Zip
 from fmus.induction_machine.dyr_records import SUBSYSTEMS
 from orchestrator.cases.networks.conversion import bus_of
-from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
+from orchestrator.cases.networks.psse.air_conditioners import FIELDS, running_law
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, number_in
 from orchestrator.cases.networks.psse.load_records import (
     RecordedLaw,
     mean_of_laws,
@@ -28,13 +32,20 @@ from orchestrator.cases.networks.psse.raw_network import FileLoad
 from orchestrator.cases.networks.psse.refusals import Refusals
 from orchestrator.core.errors import InputError, Problem, QuestionTopic, few, number_of
 
-COMPOSITE_NAMES = tuple(f"CMLD{subsystem}U2" for subsystem in SUBSYSTEMS)
-"""The records, the narrower first."""
+_NUMBERS = {"U2": 133, "U1": 132}
+"""How many numbers a record has behind those that describe a user's model, by the end of its name: CMLDBLU2 of PSS/E 35
+has one more than CMLDBLU1, at its end."""
+
+COMPOSITE_NAMES = tuple(
+    f"CMLD{subsystem}{edition}" for edition in _NUMBERS for subsystem in SUBSYSTEMS
+)
+"""The records, those of one edition together, and of these the narrower first."""
 MODEL = "induction_generator_phasor"  # the machine by its reactances
-_NUMBERS = 133  # of a record, behind the numbers that describe a user's model
 _SHARES = slice(18, 23)  # of motors A to D and of the electronic load
+_D = 3  # place of motor D among them
 _STATIC = slice(27, 37)  # exponent and share, twice, and factor of the frequency: of P, then of Q
 _MOTORS = {"a": 37, "b": 57, "c": 77}  # place of each motor's numbers
+_AIR_CONDITIONER = slice(97, 97 + len(FIELDS))  # motor D
 _OF_MOTOR = ("RA", "X", "Xp", "Xpp", "Tp", "Tpp", "H", "E")  # behind its type and its loading
 _THREE_PHASES = 3.0
 LEAKAGE = 0.8
@@ -62,7 +73,7 @@ def composite_loads(
     rests: dict[str, list[tuple[FileLoad, float, RecordedLaw]]] = {}
     used, refusals = list[DynamicRecord](), Refusals()
     for load in file_loads:
-        record = next(records_for(load, records, COMPOSITE_NAMES), None)
+        record = _record_for(load, records)
         if record is None or load.load not in elements or not load.drawn.real > 0:
             continue
         with refusals.keep():
@@ -72,7 +83,8 @@ def composite_loads(
             motors += own
             used.append(record)
             left = 1 - sum(motor.drawn.real for motor in own) / load.drawn.real
-            rests.setdefault(load.load, []).append((load, left, _law(record, numbers, left)))
+            law = _law(load, record, numbers, left)
+            rests.setdefault(load.load, []).append((load, left, law))
     refusals.tell()
     laws = {name: _law_of_all(elements[name], own) for name, own in rests.items()}
     return CompositeLoads(tuple(motors), laws, tuple(dict.fromkeys(used)))
@@ -87,22 +99,30 @@ def composite_remarks(found: CompositeLoads) -> Iterator[Problem]:
         buses = few(dict.fromkeys(bus_of(str(motor.load.bus)) for motor in own), _SHOWN)
         text = (
             f"{name}, a composite load, is approximated: {number_of(len(own), 'induction motor')} A to C for "
-            f"{p_mw:.4g} MW ({buses}), motor D and the electronic load as constant powers, the static load by its "
-            "exponents. The transformer and the feeder before it, tripping and stalling are left out; to see "
-            f"what that is worth, leave it out: dyr_leave_out = ['{name}'] in [units]"
+            f"{p_mw:.4g} MW ({buses}), motor D by what it draws while it runs, the electronic load as a constant "
+            "power, the static load by its exponents. The transformer and the feeder before it, tripping and stalling "
+            f"are left out; to see what that is worth, leave it out: dyr_leave_out = ['{name}'] in [units]"
         )
         yield Problem(place, text, topic=QuestionTopic(f"{name} approximated"))
 
 
+def _record_for(load: FileLoad, records: Sequence[DynamicRecord]) -> DynamicRecord | None:
+    """Return the record that names a load; of two editions the newer goes first."""
+    for edition in _NUMBERS:
+        names = [name for name in COMPOSITE_NAMES if name.endswith(edition)]
+        record = next(records_for(load, records, names), None)
+        if record is not None:
+            return record
+    return None
+
+
 def _numbers(record: DynamicRecord) -> list[float]:
-    try:
-        numbers = [float(text) for text in record.values[-_NUMBERS:]]
-    except ValueError:
-        numbers = []
-    if len(numbers) != _NUMBERS:
+    wanted = next(count for edition, count in _NUMBERS.items() if record.name.endswith(edition))
+    numbers = [number_in(text) for text in record.values[-wanted:]]
+    if len(numbers) != wanted or any(map(isnan, numbers)):
         raise InputError(
-            f"{record.place}: {record.name} has {len(record.values)} values behind its name; it ends with {_NUMBERS} "
-            "numbers"
+            f"{record.place}: {record.name} has {number_of(len(record.values), 'value')} behind its name; it ends with "
+            f"{wanted} numbers"
         )
     shares = numbers[_SHARES]
     if min(shares) < 0 or sum(shares) > 1 + 1e-6:
@@ -136,18 +156,26 @@ def _motors(
         yield MotorLoad(name, bus, MODEL, parameters, load, record, drawn=drawn)
 
 
-def _law(record: DynamicRecord, numbers: Sequence[float], left: float) -> RecordedLaw:
-    """The law of what no motor draws: constant powers, and the static load, which has the rest of the shares."""
+def _law(
+    load: FileLoad, record: DynamicRecord, numbers: Sequence[float], left: float
+) -> RecordedLaw:
+    """The law of what no motor A to C draws: the static load, which has the rest of the shares, motor D, constants."""
+    place = (record.file, record.line)
     static = max(0.0, 1 - sum(numbers[_SHARES]))
-    share = static / left if left > 0 else 0.0
     of_p, of_q = numbers[_STATIC][:5], numbers[_STATIC][5:]
-    laws = [_static(numbers) for numbers in (of_p, of_q)]
-    active, reactive = (
-        Zip(share * law.z, share * law.i, share * law.p + 1 - share) for law in laws
-    )
-    return RecordedLaw(
-        (record.file, record.line), active, reactive, share * of_p[4], share * of_q[4]
-    )
+    laws = [RecordedLaw(place, _static(of_p), _static(of_q), of_p[4], of_q[4])]
+    shares = [static]
+    of_d = numbers[_SHARES][_D]
+    if of_d:
+        running = running_law(record, numbers[_AIR_CONDITIONER], of_d * load.drawn, load.v_pu)
+        laws.append(
+            RecordedLaw(place, running.active, running.reactive, running.k_pf, running.k_qf)
+        )
+        shares.append(of_d)
+    constant = max(0.0, left - sum(shares))
+    laws.append(RecordedLaw(place, LAWS["power"], LAWS["power"], 0.0, 0.0))
+    shares.append(constant)
+    return mean_of_laws(laws, [complex(share, share) for share in shares])
 
 
 def _static(numbers: Sequence[float]) -> Zip:

@@ -17,6 +17,7 @@ from fmus.static_var.dyr_records import STATIC_VAR_RECORDS
 from fmus.synchronous_generator.dyr_records import DYR_RECORDS
 from fmus.toolchain.dyr_form import DyrRecord
 from fmus.wecc_renewable.dyr_records import CONTROLLER, CONTROLLER_RECORD, PLANT_RECORDS
+from orchestrator.cases.networks.psse.air_conditioners import AIR_CONDITIONERS
 from orchestrator.cases.networks.psse.composite_loads import COMPOSITE_NAMES
 from orchestrator.cases.networks.psse.composite_loads import MODEL as MODEL_OF_MOTORS
 from orchestrator.cases.networks.psse.dyr_file import NUMBERED
@@ -47,7 +48,11 @@ _FREQUENCY = "PowerWorld's guide to PSS/E's load models"
 _RELAYS = "PowerWorld's guide to PSS/E's relay models; fields as InterPSS and GridPACK read them"
 _OF_BUS = "three-winding transformers at the bus stay on"
 _NOT_SHED = "a load for which motors stand keeps its power"
-_COMPOSITE = "WECC's composite load model; fields as InterPSS reads them"
+_COMPOSITE = "WECC's composite load model; fields as InterPSS and GridPACK read them"
+_AIR_CONDITIONERS = (
+    "WECC's composite load model, motor D; fields and equations as GridPACK has them"
+)
+_RUNNING = "what it draws while it runs, near v_0; stalling and trips left out"
 _LEFT_OUT = "motors A to C by their share, the rest a load; feeder, trips, stalling left out"
 _MOTORS = "PowerWorld's guide to PSS/E's load models, and STEPS' reader"
 _GENERIC = (
@@ -79,6 +84,7 @@ def known_records() -> list[KnownRecord]:
         *_of_names(LOAD_RECORDS, _LOADS, "an exponent other than 0, 1, 2 near v_0"),
         *_of_table(INDUCTION_RECORDS, _INDUCTION, "machine"),
         *_of_names(FREQUENCY_RECORDS, _FREQUENCY, "r, s not used; no constant impedances"),
+        *_of_names(AIR_CONDITIONERS, _AIR_CONDITIONERS, _RUNNING),
         *_of_names(COMPOSITE_NAMES, _COMPOSITE, _LEFT_OUT, MODEL_OF_MOTORS),
         *_of_table(MOTOR_NAMES, _MOTORS, "load"),
         *_of_plants(),

@@ -5,6 +5,8 @@
 They are of one load or bus (BL), an owner (OW), a zone (ZN), an area (AR), or all loads (AL); the narrower goes first.
 v is relative to the power flow's voltage, and shares that miss 1 are scaled to it, as GridPACK has it.
 
+ACMTBLU1 and its like are air conditioners while they run (`air_conditioners`); the records above go before them.
+
 An exponent other than 0, 1 and 2 becomes the mixture of impedance, current and power that has the same power, slope and
 curvature at the power flow's voltage. Source: GridPACK at bea5ce1a."""
 
@@ -12,15 +14,22 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from fmus.grid.element_data import Load, Zip
+from orchestrator.cases.networks.psse.air_conditioners import (
+    AIR_CONDITIONERS,
+    numbers_of_air_conditioner,
+    running_law,
+)
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.raw_network import FileLoad
-from orchestrator.core.errors import Problem, QuestionTopic
+from orchestrator.cases.networks.psse.refusals import Refusals
+from orchestrator.core.errors import Problem, QuestionTopic, few, number_of
 
 LOAD_RECORDS = ("IEELBL", "IEELOW", "IEELZN", "IEELAR", "IEELAL")
 """The records, the narrower first."""
 _EVERY = "*"  # identifier of all loads of the bus, area, zone or owner
 _VALUES = 14
 _SUM = 1e-3  # by which shares may miss 1
+_SHOWN = 8  # buses that a remark names; the others are counted
 _LEAST_SHARE = 1e-6  # of a sum of shares that can be scaled to 1
 
 
@@ -47,10 +56,19 @@ class RecordedLaws:
 def recorded_laws(records: Sequence[DynamicRecord], loads: Sequence[FileLoad]) -> RecordedLaws:
     """Return the law of each load that a record names.
 
-    Loads of one bus whose laws differ are one load here, with the mean of the laws by their powers."""
+    Loads of one bus whose laws differ are one load here, with the mean of the laws by their powers.
+
+    Raises
+    ------
+    InputError
+        If records of air conditioners have not their numbers, or one that cannot be; with all of them.
+    """
     own: dict[str, list[tuple[FileLoad, RecordedLaw | None]]] = {}
+    refusals = Refusals()
     for load in loads:
-        own.setdefault(load.load, []).append((load, _law_for(load, records)))
+        with refusals.keep():
+            own.setdefault(load.load, []).append((load, _law_for(load, records)))
+    refusals.tell()
     found, used = {}, set()
     for name, members in own.items():
         laws = [law for _, law in members if law is not None]
@@ -63,7 +81,11 @@ def recorded_laws(records: Sequence[DynamicRecord], loads: Sequence[FileLoad]) -
 
 def _remarks(records: Iterable[DynamicRecord]) -> Iterator[Problem]:
     """Say where a record is not taken to the letter."""
-    for record in records:
+    found = list(records)
+    yield from _of_air_conditioners([x for x in found if x.name in AIR_CONDITIONERS])
+    for record in found:
+        if record.name in AIR_CONDITIONERS:
+            continue
         values = [float(text) for text in record.values]
         for quantity, at in (("P", 0), ("Q", 3)):
             total = sum(values[at : at + 3])
@@ -71,6 +93,19 @@ def _remarks(records: Iterable[DynamicRecord]) -> Iterator[Problem]:
                 text = f"{record.name}: the shares of {quantity} sum to {total:g}; they are scaled to 1"
                 topic = QuestionTopic(f"shares of {quantity} that do not sum to 1")
                 yield Problem(record.place, text, topic=topic)
+
+
+def _of_air_conditioners(records: Sequence[DynamicRecord]) -> Iterator[Problem]:
+    for name in dict.fromkeys(record.name for record in records):
+        own = [record for record in records if record.name == name]
+        buses = few(dict.fromkeys(str(record.bus) for record in own), _SHOWN)
+        text = (
+            f"{name}, air conditioners of one phase ({number_of(len(own), 'record')}: {buses}), is approximated: the "
+            "loads draw near their voltage what running motors do; stalling, restarting, and the trips of contactors, "
+            "undervoltage relays and thermal protection are left out. To see what that is worth, leave it out: "
+            f"dyr_leave_out = ['{name}'] in [units]"
+        )
+        yield Problem(own[0].place, text, topic=QuestionTopic(f"{name} approximated"))
 
 
 def with_recorded_laws(load: Load, law: RecordedLaw) -> Load:
@@ -95,7 +130,15 @@ def records_for(
 
 def _law_for(load: FileLoad, records: Sequence[DynamicRecord]) -> RecordedLaw | None:
     record = next(records_for(load, records, LOAD_RECORDS), None)
-    return None if record is None else _law_of(record)
+    if record is not None:
+        return _law_of(record)
+    record = next(records_for(load, records, AIR_CONDITIONERS), None)
+    if record is None or not load.p_mw > 0:
+        return None
+    drawn = complex(load.p_mw, load.q_mvar)
+    law = running_law(record, numbers_of_air_conditioner(record), drawn, load.v_pu)
+    place = (record.file, record.line)
+    return RecordedLaw(place, law.active, law.reactive, law.k_pf, law.k_qf)
 
 
 def _law_of(record: DynamicRecord) -> RecordedLaw | None:

@@ -54,6 +54,7 @@ def read_loads(net: RawTables) -> None:
             p_mw=pl + current.real + admittance.real * v**2,
             q_mvar=ql + current.imag - admittance.imag * v**2,
             drawn=power,
+            v_pu=v,
         )
         net.file_loads.append((one, bus, power.real < 0))
 

@@ -71,7 +71,7 @@ class FileLoad:
     """One load in service [MW, Mvar], by what a record of dynamics data may name it.
 
     ``load``: name of the case's load, which all loads of a bus are together that draw, or that feed; ``drawn``: its
-    part of that [MW, Mvar], without an admittance that stands there as a shunt."""
+    part of that [MW, Mvar], without an admittance that stands there as a shunt; ``v_pu``: the file's voltage."""
 
     load: str
     bus: int
@@ -82,6 +82,7 @@ class FileLoad:
     p_mw: float
     q_mvar: float
     drawn: complex = 0j
+    v_pu: float = 1.0
 
 
 @dataclass(frozen=True)

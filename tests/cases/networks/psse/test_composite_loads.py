@@ -1,5 +1,7 @@
 """Composite loads: their motors, what is left as a load, and a case with one."""
 
+import math
+
 import pytest
 
 from fmus.grid.element_data import Load, Zip
@@ -14,6 +16,7 @@ from orchestrator.cases.networks.psse.raw_network import FileLoad
 from orchestrator.cases.networks.record_use import UseOfRecord
 from orchestrator.core.errors import InputError
 from orchestrator.studies.modes.modes import compute_modes
+from tests.cases.networks.psse.test_air_conditioners import TYPICAL
 from tests.cases.networks.psse.test_motor_loads import RAW, STIFF, case  # noqa: F401 - a fixture
 from tests.support.scenarios import prepare_one
 
@@ -30,16 +33,20 @@ A = [3, 0.75, 0.04, 1.8, 0.12, 0.104, 0.095, 0.0021, 0.1, 0]
 B = [3, 0.75, 0.03, 1.8, 0.19, 0.14, 0.2, 0.0026, 0.5, 2]
 C = [3, 0.75, 0.03, 1.8, 0.19, 0.14, 0.2, 0.0026, 0.1, 2]
 TRIPS = [0] * 10
+D = [float(text) for text in TYPICAL.split()]
+EDITIONS = {"U2": ("12 1 2 133 27 146 48 0 0", 133), "U1": ("12 1 0 132 27 146 48", 132)}
 
 
-def record(shares=(0.2, 0.1, 0.05, 0.3, 0.15), c=C, bus=2, identifier="1", head="USRLOD"):
-    """A record as parsers write it: what describes a user's model, then its 133 numbers."""
+def record(shares=(0.2, 0.1, 0.05, 0.3, 0.15), c=C, bus=2, head="USRLOD", edition="U2"):
+    """A record as parsers write it: what describes a user's model, then its 133 numbers, or 132."""
+    counts, wanted = EDITIONS[edition]
     numbers = [*FEEDER, *shares, *ELECTRONIC, *STATIC]
     assert len(numbers) == 37
-    numbers += [*A, *TRIPS, *B, *TRIPS, *c, *TRIPS]
-    numbers += [0] * (133 - len(numbers))
-    what = "'CMLDBLU2' 12 1 2 133 27 146 48 0 0"
-    return f"{bus} '{head}' {identifier} {what} {' '.join(map(str, numbers))} /\n"
+    numbers += [*A, *TRIPS, *B, *TRIPS, *c, *TRIPS, *D]
+    assert len(numbers) == 132
+    numbers += [0] * (wanted - len(numbers))
+    what = f"'CMLDBL{edition}' {counts}"
+    return f"{bus} '{head}' 1 {what} {' '.join(map(str, numbers))} /\n"
 
 
 def found(tmp_path, text):
@@ -70,8 +77,24 @@ def test_what_is_left_is_a_load_with_the_records_law(tmp_path):
     law = composite.laws["load_2"]
     of_p = [0.2 * 0.4 / 0.65, 0.2 * 0.5 / 0.65, (0.2 * 0.1 + 0.45) / 0.65]
     assert (law.active.z, law.active.i, law.active.p) == pytest.approx(of_p)
-    assert law.reactive.z == pytest.approx(-0.5 * 0.2 / 0.65)
-    assert (law.k_pf, law.k_qf) == pytest.approx((0.8 * 0.2 / 0.65, -0.2 / 0.65))
+    assert law.k_pf == pytest.approx((0.8 * 0.2 + 1.0 * 0.3) / 0.65)
+
+
+@pytest.mark.parametrize("v", [0.9, 1.0, 1.06])
+def test_motor_d_draws_what_it_does_while_it_runs(tmp_path, v):
+    """Of 20 Mvar 13 are left: 4 static, 6 of motor D at a rating of 24 / 0.8 MVA, 3 constant."""
+    law = found(tmp_path, record()).laws["load_2"].reactive
+    static = 4 * (-0.5 * v**2 + 1.5 * v)
+    own = 24 * math.tan(math.acos(0.97))
+    motor = own + 30 * 6 * ((v - 0.86) ** 2 - 0.14**2) + (6 - own) * v**2
+    assert 13 * (law.z * v**2 + law.i * v + law.p) == pytest.approx(static + motor + 3)
+
+
+def test_the_older_edition_is_the_same_load(tmp_path):
+    new, old = (found(tmp_path, record(edition=edition)) for edition in EDITIONS)
+    assert [motor.parameters for motor in old.motors] == [motor.parameters for motor in new.motors]
+    assert (old.laws, old.records[0].name) == (new.laws, "CMLDBLU1")
+    assert found(tmp_path, record(edition="U1") + record()).records[0].name == "CMLDBLU2"
 
 
 def test_a_load_beside_it_at_its_bus_keeps_its_law(tmp_path):
@@ -81,7 +104,7 @@ def test_a_load_beside_it_at_its_bus_keeps_its_law(tmp_path):
     assert law.z == pytest.approx(weight * 0.2 * 0.4 / 0.65 + (1 - weight))
 
 
-def test_a_motor_of_one_phase_is_a_constant_power(tmp_path):
+def test_a_motor_a_to_c_of_one_phase_is_a_constant_power(tmp_path):
     composite = found(tmp_path, record(c=[1, *C[1:]]))
     assert [motor.name[-1] for motor in composite.motors] == ["a", "b"]
     assert sum(motor.drawn.real for motor in composite.motors) == pytest.approx(24.0)
@@ -98,7 +121,8 @@ def test_a_load_of_motors_alone_leaves_nothing(tmp_path):
         (record(shares=(0.5, 0.4, 0.3, 0, 0)), "the shares 0.5, 0.4, 0.3, 0, 0 of motors A to D"),
         (record(shares=(-0.1, 0.4, 0.3, 0, 0)), "each is 0 or more"),
         (record(c=[3, 0, *C[2:]]), "the loading LFm = 0 of motor C; it must exceed 0"),
-        ("2 'CMLDBLU2' 1 5 /\n", "has 1 values behind its name; it ends with 133 numbers"),
+        ("2 'CMLDBLU2' 1 5 /\n", "has 1 value behind its name; it ends with 133 numbers"),
+        (record().replace("0.97", "1.2"), "the power factor 1.2 of a motor of one phase"),
     ],
 )
 def test_a_record_that_cannot_be_is_refused_by_its_line(tmp_path, text, told):
