@@ -14,6 +14,7 @@ from orchestrator.core.units import LARGEST
 MOST_BYTES = 100_000_000  # of a file
 _TOKEN = re.compile(r"""(?P<quoted>'[^']*'|"[^"]*")|(?P<plain>[^\s,'"/]+)|(?P<slash>/)|,""")
 _MODEL = re.compile(r"[A-Za-z]\w{2,}")  # of a DC line, whose name stands where others have a bus
+_COMMENTS = ("//", "@!", "#")  # beginnings of lines that hold no record; # as public files have it
 EVENT = "TOGGLE"  # an event of ANDES, which writes some into its files of dynamics data
 _OWN_MODELS = (
     "USRMDL",
@@ -75,9 +76,9 @@ def read_dyr(path: Path) -> list[DynamicRecord]:
     begin = 0
     names = 0  # values in quotes with which the record begins
     for number, line in enumerate(
-        visible(read_text(path, MOST_BYTES, errors="replace")).splitlines(), start=1
+        visible(read_text(path, MOST_BYTES, "utf-8-sig", "replace")).splitlines(), start=1
     ):
-        if line.lstrip().startswith(("//", "@!")):
+        if line.lstrip().startswith(_COMMENTS):
             continue
         for token in _TOKEN.finditer(line):
             if token["slash"]:

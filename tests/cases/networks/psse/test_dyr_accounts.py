@@ -55,6 +55,14 @@ def test_comments_slashes_alone_and_double_quotes(tmp_path):
     assert records[0].values == ("4.0", "0.0")
 
 
+def test_lines_of_hashes_and_the_mark_of_utf8_are_no_records(tmp_path):
+    """Public files have both: IEEE300_dyn_v2_cmld.dyr and IEEE39bus_3AC.dyr of InterPSS."""
+    records = read(
+        tmp_path, "\ufeff1 'GENCLS' 1 4.0 0.0 /\n#---- loads below\n2 'GENCLS' 1 3 0 /\n"
+    )
+    assert [(r.line, r.bus, r.name) for r in records] == [(1, 1, "GENCLS"), (3, 2, "GENCLS")]
+
+
 def test_models_that_are_missing_are_one_table(tmp_path):
     many = "".join(f"{bus} 'URST5T' 1 0.1 /\n" for bus in (1, 2, 3))
     many += "2 'LCFB1' 1 3 /\n3 'OWNGOV' 1 3 /\n"
