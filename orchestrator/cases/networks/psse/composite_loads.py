@@ -25,10 +25,10 @@ from orchestrator.cases.networks.psse.load_records import (
     RecordedLaw,
     mean_of_laws,
     mixture,
-    records_for,
 )
 from orchestrator.cases.networks.psse.motor_loads import MotorLoad
 from orchestrator.cases.networks.psse.raw_network import FileLoad
+from orchestrator.cases.networks.psse.records_of_loads import RecordsOfLoads
 from orchestrator.cases.networks.psse.refusals import Refusals
 from orchestrator.core.errors import InputError, Problem, QuestionTopic, few, number_of
 
@@ -71,9 +71,10 @@ def composite_loads(
     at_bus = Counter(load.bus for load in file_loads)
     motors: list[MotorLoad] = []
     rests: dict[str, list[tuple[FileLoad, float, RecordedLaw]]] = {}
+    of_loads = RecordsOfLoads(records)
     used, refusals = list[DynamicRecord](), Refusals()
     for load in file_loads:
-        record = _record_for(load, records)
+        record = _record_for(load, of_loads)
         if record is None or load.load not in elements or not load.drawn.real > 0:
             continue
         with refusals.keep():
@@ -106,11 +107,11 @@ def composite_remarks(found: CompositeLoads) -> Iterator[Problem]:
         yield Problem(place, text, topic=QuestionTopic(f"{name} approximated"))
 
 
-def _record_for(load: FileLoad, records: Sequence[DynamicRecord]) -> DynamicRecord | None:
+def _record_for(load: FileLoad, records: RecordsOfLoads) -> DynamicRecord | None:
     """Return the record that names a load; of two editions the newer goes first."""
     for edition in _NUMBERS:
         names = [name for name in COMPOSITE_NAMES if name.endswith(edition)]
-        record = next(records_for(load, records, names), None)
+        record = records.first(load, names)
         if record is not None:
             return record
     return None

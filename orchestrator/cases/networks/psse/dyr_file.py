@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from fmus.toolchain.dyr_form import DyrField
@@ -71,19 +72,24 @@ def read_dyr(path: Path) -> list[DynamicRecord]:
     size = path.stat().st_size
     if size > MOST_BYTES:
         raise InputError.at(f"{path}", f"it has {size} bytes; at most {MOST_BYTES} are read")
+    text = read_text(path, MOST_BYTES, "utf-8-sig", "replace")
+    return list(_records_in(str(path), visible(text)))
+
+
+@lru_cache(maxsize=2)
+def _records_in(file: str, text: str) -> tuple[DynamicRecord, ...]:
+    """Return the records of a text; the last ones are kept, as an outage of a screening reads its file three times."""
     records: list[DynamicRecord] = []
     tokens: list[str] = []
     begin = 0
     names = 0  # values in quotes with which the record begins
-    for number, line in enumerate(
-        visible(read_text(path, MOST_BYTES, "utf-8-sig", "replace")).splitlines(), start=1
-    ):
+    for number, line in enumerate(text.splitlines(), start=1):
         if line.lstrip().startswith(_COMMENTS):
             continue
         for token in _TOKEN.finditer(line):
             if token["slash"]:
                 if tokens:  # else a comment, or a slash alone
-                    records.append(_record(str(path), begin, tokens, names))
+                    records.append(_record(file, begin, tokens, names))
                 tokens = []
                 break  # what follows on the line is a comment
             if token["quoted"] or token["plain"]:
@@ -92,9 +98,9 @@ def read_dyr(path: Path) -> list[DynamicRecord]:
                 tokens.append(token["plain"] or token["quoted"][1:-1].strip())
     if tokens:
         raise InputError.at(
-            f"{path}, line {begin}", "the record does not end with a slash; the file is cut short"
+            f"{file}, line {begin}", "the record does not end with a slash; the file is cut short"
         )
-    return records
+    return tuple(records)
 
 
 def facts_name(device: str) -> str:

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 from fmus.grid.element_data import LAWS, Load
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
-from orchestrator.cases.networks.psse.load_records import records_for
 from orchestrator.cases.networks.psse.raw_network import FileLoad
+from orchestrator.cases.networks.psse.records_of_loads import RecordsOfLoads
 from orchestrator.core.errors import Problem, QuestionTopic
 
 FREQUENCY_RECORDS = ("LDFRBL", "LDFROW", "LDFRZN", "LDFRAR", "LDFRAL")
@@ -36,11 +36,12 @@ def recorded_frequency(
     """Return the factors of the loads that a record names and that are no constant impedances.
 
     Loads of one bus whose factors differ are one load here, with the mean by their powers."""
+    of_loads = RecordsOfLoads(records)
     following = {load.name for load in loads if _may_follow(load)}
     members: dict[str, list[tuple[FileLoad, DynamicRecord | None]]] = {}
     for load in file_loads:
         if load.load in following:
-            found = next(records_for(load, records, FREQUENCY_RECORDS), None)
+            found = of_loads.first(load, FREQUENCY_RECORDS)
             record = found if found is not None and _numbers(found) else None
             members.setdefault(load.load, []).append((load, record))
     named = {name: own for name, own in members.items() if any(record for _, record in own)}

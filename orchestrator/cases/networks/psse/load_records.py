@@ -21,12 +21,12 @@ from orchestrator.cases.networks.psse.air_conditioners import (
 )
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.raw_network import FileLoad
+from orchestrator.cases.networks.psse.records_of_loads import RecordsOfLoads
 from orchestrator.cases.networks.psse.refusals import Refusals
 from orchestrator.core.errors import Problem, QuestionTopic, few, number_of
 
 LOAD_RECORDS = ("IEELBL", "IEELOW", "IEELZN", "IEELAR", "IEELAL")
 """The records, the narrower first."""
-_EVERY = "*"  # identifier of all loads of the bus, area, zone or owner
 _VALUES = 14
 _SUM = 1e-3  # by which shares may miss 1
 _SHOWN = 8  # buses that a remark names; the others are counted
@@ -64,10 +64,10 @@ def recorded_laws(records: Sequence[DynamicRecord], loads: Sequence[FileLoad]) -
         If records of air conditioners have not their numbers, or one that cannot be; with all of them.
     """
     own: dict[str, list[tuple[FileLoad, RecordedLaw | None]]] = {}
-    refusals = Refusals()
+    of_loads, refusals = RecordsOfLoads(records), Refusals()
     for load in loads:
         with refusals.keep():
-            own.setdefault(load.load, []).append((load, _law_for(load, records)))
+            own.setdefault(load.load, []).append((load, _law_for(load, of_loads)))
     refusals.tell()
     found, used = {}, set()
     for name, members in own.items():
@@ -113,26 +113,11 @@ def with_recorded_laws(load: Load, law: RecordedLaw) -> Load:
     return replace(load, active=law.active, reactive=law.reactive, k_pf=law.k_pf, k_qf=law.k_qf)
 
 
-def records_for(
-    load: FileLoad, records: Sequence[DynamicRecord], names: Sequence[str]
-) -> Iterator[DynamicRecord]:
-    """Yield the records that name a load, the one that goes first before others.
-
-    ``names``: of the records of a load, an owner, a zone, an area, and of all loads."""
-    numbers = (load.bus, load.owner, load.zone, load.area, None)
-    for kind, number in zip(names, numbers, strict=True):
-        of_kind = [record for record in records if record.name == kind]
-        for identifier in (load.name, _EVERY):
-            for record in of_kind:
-                if number in (None, record.bus) and record.machine == identifier:
-                    yield record
-
-
-def _law_for(load: FileLoad, records: Sequence[DynamicRecord]) -> RecordedLaw | None:
-    record = next(records_for(load, records, LOAD_RECORDS), None)
+def _law_for(load: FileLoad, records: RecordsOfLoads) -> RecordedLaw | None:
+    record = records.first(load, LOAD_RECORDS)
     if record is not None:
         return _law_of(record)
-    record = next(records_for(load, records, AIR_CONDITIONERS), None)
+    record = records.first(load, AIR_CONDITIONERS)
     if record is None or not load.p_mw > 0:
         return None
     drawn = complex(load.p_mw, load.q_mvar)

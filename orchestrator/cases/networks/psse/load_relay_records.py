@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from math import inf
 
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
-from orchestrator.cases.networks.psse.load_records import records_for
 from orchestrator.cases.networks.psse.raw_network import FileLoad
+from orchestrator.cases.networks.psse.records_of_loads import RecordsOfLoads
 from orchestrator.cases.networks.psse.refusals import Refusals
 from orchestrator.cases.networks.psse.relay_records import check_times, numbers_of
 from orchestrator.core.errors import InputError, number_of
@@ -115,10 +115,11 @@ def load_relays(records: Sequence[DynamicRecord], loads: Sequence[FileLoad]) -> 
     InputError
         If records have not their values, or one that cannot be; with all of them.
     """
+    of_loads = RecordsOfLoads(records)
     found, refusals = list[LoadRelay](), Refusals()
     for load in loads:
         for form in LOAD_RELAYS:
-            record = next(records_for(load, records, form.names), None)
+            record = of_loads.first(load, form.names)
             if record is not None and load.p_mw > 0:
                 with refusals.keep():
                     found += _stages(record, load, form)

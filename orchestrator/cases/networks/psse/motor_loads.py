@@ -14,8 +14,8 @@ from fmus.toolchain.dyr_form import DyrRecord
 from orchestrator.cases.networks.conversion import bus_of
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, number_of_field
 from orchestrator.cases.networks.psse.dyr_values import values_of_record
-from orchestrator.cases.networks.psse.load_records import records_for
 from orchestrator.cases.networks.psse.raw_network import FileLoad
+from orchestrator.cases.networks.psse.records_of_loads import RecordsOfLoads
 from orchestrator.cases.networks.psse.refusals import Refusals
 from orchestrator.core.errors import InputError, Problem, QuestionTopic, few, number_of
 
@@ -69,9 +69,10 @@ def motor_loads(
     """
     buses = {load.name: load.bus for load in loads}
     at_bus = Counter(load.bus for load in file_loads)
+    of_loads = RecordsOfLoads(records)
     found, refusals = list[MotorLoad](), Refusals()
     for load in file_loads:
-        record = _record_for(load, records)
+        record = _record_for(load, of_loads)
         if record is None or load.load not in buses or not load.drawn.real > 0:
             continue
         own = f"_{_NO_LETTER.sub('_', load.name)}" if at_bus[load.bus] > 1 else ""
@@ -146,10 +147,10 @@ def _of_loading(motor: MotorLoad, loading: float) -> str:
     )
 
 
-def _record_for(load: FileLoad, records: Sequence[DynamicRecord]) -> DynamicRecord | None:
+def _record_for(load: FileLoad, records: RecordsOfLoads) -> DynamicRecord | None:
     for model in MOTOR_RECORDS:
         names = [f"{model}{subsystem}" for subsystem in SUBSYSTEMS]
-        record = next(records_for(load, records, names), None)
+        record = records.first(load, names)
         if record is not None:
             return record
     return None

@@ -63,6 +63,13 @@ def test_lines_of_hashes_and_the_mark_of_utf8_are_no_records(tmp_path):
     assert [(r.line, r.bus, r.name) for r in records] == [(1, 1, "GENCLS"), (3, 2, "GENCLS")]
 
 
+def test_a_file_that_changes_is_read_anew(tmp_path):
+    first = read(tmp_path, "1 'GENCLS' 1 4.0 0.0 /\n")
+    first.clear()
+    assert [r.bus for r in read(tmp_path, "1 'GENCLS' 1 4.0 0.0 /\n")] == [1]
+    assert [r.bus for r in read(tmp_path, "2 'GENCLS' 1 4.0 0.0 /\n")] == [2]
+
+
 def test_models_that_are_missing_are_one_table(tmp_path):
     many = "".join(f"{bus} 'URST5T' 1 0.1 /\n" for bus in (1, 2, 3))
     many += "2 'LCFB1' 1 3 /\n3 'OWNGOV' 1 3 /\n"
