@@ -216,23 +216,19 @@ class HubEquations:
 
     def near_at(self, sigma: complex) -> "HubFactors | None":
         """The same by the divided hub, where there is one: `solve_exactly` is as accurate, `solve` is close."""
-        factors = self.untried_at(sigma)
-        if factors is None:
-            return self.at(sigma) if self.divided is None else None
+        if self.divided is None:
+            return self.at(sigma)
+        found = self._through_blocks(complex(sigma))
+        if found is None:
+            return None
+        blocks, inside = found
+        hub = self.divided.at(sigma, inside[self.entered])
+        factors = HubFactors(self, sigma, blocks, inside, hub)
         left = factors.left_over(self._trial(np.dtype(complex)))
         is_near = next(left) <= _NEAR
         if not next(left) <= _ACCURATE:
             return self.at(sigma)
         return factors if is_near else replace(factors, is_near=False)
-
-    def untried_at(self, sigma: complex) -> "HubFactors | None":
-        """The same without a trial of its accuracy, for who proves the solutions; None if the hub is not divided."""
-        found = None if self.divided is None else self._through_blocks(complex(sigma))
-        if self.divided is None or found is None:
-            return None
-        blocks, inside = found
-        hub = self.divided.at(sigma, inside[self.entered])
-        return HubFactors(self, sigma, blocks, inside, hub)
 
     def _trial(self, kind: np.dtype) -> Vector:
         return np.random.default_rng(1).standard_normal(self.states).astype(kind)

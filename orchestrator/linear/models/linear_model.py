@@ -214,13 +214,6 @@ class LinearModel:
             )
         )
 
-    def solver_beside(self, sigma: complex) -> Callable[[Vector], Vector] | None:
-        """Return what solves (A − σI)ᴴ·x = b for many columns, close to an eigenvalue; None without a divided hub.
-
-        Nothing has tried how accurate it is: what comes of it is to be proved by `shifted` elsewhere."""
-        factors = self.hub.untried_at(sigma) if self.hub and self.is_searched_in_blocks else None
-        return factors.solve_adjoint if factors else None
-
     def _hub_at(self, sigma: complex) -> HubFactors | None:
         if self.hub is None:
             return None

@@ -28,8 +28,8 @@ ROUGH = 1e-2
 """A value beyond a limit has settled if it moves by less than this part of itself, or of half its distance from the
 limit: its place need not be known better."""
 
-_FIRST = 40
-"""Vectors before the first look: ten powers of the operator, where four are taken at once."""
+_FIRST = 10
+"""Powers of the operator before the first look, each with as many vectors as are taken at once."""
 
 # the largest values beyond a limit that have to have settled before the search there may end
 _BEYOND = 8
@@ -63,6 +63,7 @@ class BlockArnoldi:
 
     ``apply``: The operator, for complex vectors as columns, shape (n, k).
     ``width``: Vectors that are taken at once.
+    ``first``: Vectors to begin with, as many; random ones where none are given.
     ``room``: Where the vectors stand; the search is over when another one takes it.
 
     ``values``, ``accuracy``: Approximations of the eigenvalues, largest first; and how large what they leave over is,
@@ -75,10 +76,11 @@ class BlockArnoldi:
         most: int = MOST,
         *,
         width: int = WIDTHS[0],
+        first: Vector | None = None,
         room: VectorRoom | None = None,
     ) -> None:
         self._apply, self._size = apply, size
-        self.width = max(1, min(width, size // 2))
+        self.width = max(1, min(width, size // 2)) if first is None else first.shape[1]
         self._most = max(min(most, size - self.width), self.width)
         self._random = np.random.default_rng(0)  # the same search gives the same answer
         self._basis = (room or VectorRoom()).columns(size, self._most + self.width)
@@ -88,7 +90,9 @@ class BlockArnoldi:
             (self._sketch.shape[0], self._most + self.width), dtype=complex, order="F"
         )
         self._done = -self.width
-        self._keep(self._random.standard_normal((size, self.width)) + 0j)
+        self._keep(
+            self._random.standard_normal((size, self.width)) + 0j if first is None else first
+        )
         self.values: NDArray[np.complex128] = np.zeros(0, dtype=complex)
         self.accuracy: NDArray[np.float64] = np.zeros(0)
         self._coordinates: Matrix = np.zeros((0, 0), dtype=complex)
@@ -100,7 +104,7 @@ class BlockArnoldi:
 
     def grow(self) -> bool:
         """Take more vectors, and look at the values; False where there are as many as may be."""
-        wanted = min(self._most, max(_FIRST, int(np.ceil(_GROWTH * self._done))))
+        wanted = min(self._most, max(_FIRST * self.width, int(np.ceil(_GROWTH * self._done))))
         if self._done + self.width > self._most:
             return False
         while self._done < wanted and self._done + self.width <= self._most:
@@ -114,6 +118,16 @@ class BlockArnoldi:
             self._basis[:, : len(self._coordinates)] @ self._coordinates[:, list(places)]
         )
         return found
+
+    def duals(self, places: Sequence[int]) -> Vector:
+        """Vectors to which those of all other values are at right angles, shape (n, number of places).
+
+        They are near left eigenvectors: the left eigenvectors of other values that have settled are not in them, and
+        what is in them of smaller values dies away as the adjoint operator is applied."""
+        turned = self._coordinates.conj().T
+        of_places = np.eye(len(turned))[:, list(places)]
+        parts = np.linalg.lstsq(turned, of_places.astype(complex), rcond=None)[0]
+        return times(self._sketch.T, self._images[:, : len(parts)] @ parts)
 
     def knows_all_beyond(self, size: float, wanted: Callable[[int], bool]) -> bool:
         """Return whether all values of that size or more are known, and the next ones are seen to be smaller."""

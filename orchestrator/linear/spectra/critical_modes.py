@@ -19,12 +19,10 @@ from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra import modes as spectra
 from orchestrator.linear.spectra.block_arnoldi import (
     MOST,
-    TOLERANCE,
     WIDTHS,
     BlockArnoldi,
     VectorRoom,
 )
-from orchestrator.linear.spectra.left_vectors import left_vectors
 from orchestrator.linear.spectra.region_cells import RegionCell
 
 DENSE = 200  # up to this number of states, the full spectrum is cheaper
@@ -371,26 +369,31 @@ class Search:
         """The same, from the space of both sides' vectors: its eigenvalues have the square of their accuracy."""
         wanted = blocks.values[chosen]
         with one_thread():
-            right = blocks.vectors(chosen)
-            left = left_vectors(self._model, self.sigma, wanted)
-            found = None if left is None else self._both_sides(wanted, left, right)
-            if found is None or not self._are_left(*found[:2]):
-                found = self._both_sides(wanted, self._left_by_search(wanted, blocks.width), right)
+            left = self._left_by_search(wanted, blocks.duals(chosen), blocks.width)
+            found = self._both_sides(wanted, left, blocks.vectors(chosen))
         if found is None:
             raise self._not_converging
         nu, left, right = found
         values = self._to_lambda(nu)
         return [(complex(values[k]), left[:, k], right[:, k]) for k in range(len(chosen))]
 
-    def _left_by_search(self, wanted: NDArray[np.complex128], width: int) -> Vector:
-        """Left eigenvectors of some ν by a search in the adjoint equations, with as many vectors at once."""
-        size = len(self._model.names)
-        adjoint = BlockArnoldi(
-            self._solver.solve_adjoint, size, 2 * MOST, width=width, room=self._rooms[1]
-        )
-        if not _grow(adjoint, lambda found: _partners(found, wanted) is not None):
-            raise self._not_converging
-        return adjoint.vectors(_partners(adjoint, wanted) or ())
+    def _left_by_search(self, wanted: NDArray[np.complex128], near: Vector, width: int) -> Vector:
+        """Left eigenvectors of some ν by a search in the adjoint equations.
+
+        ``near``: What is near them, where the search begins. Where that leads nowhere, another one begins with as many
+        random vectors at once as ``width``."""
+        for first, most in ((near, MOST), (None, 2 * MOST)):
+            adjoint = BlockArnoldi(
+                self._solver.solve_adjoint,
+                len(near),
+                most,
+                width=width,
+                first=first,
+                room=self._rooms[1],
+            )
+            if _grow(adjoint, lambda found: _partners(found, wanted) is not None):
+                return adjoint.vectors(_partners(adjoint, wanted) or ())
+        raise self._not_converging
 
     def _both_sides(
         self, wanted: NDArray[np.complex128], left: Vector, right: Vector
@@ -412,12 +415,6 @@ class Search:
         # nor is it where one is not a number
         is_same = bool((np.concatenate([rest, moves]) <= _SAME).all())
         return (nu, left, right) if is_same else None
-
-    def _are_left(self, nu: NDArray[np.complex128], left: Vector) -> bool:
-        """Return whether the adjoint equations around σ turn no left eigenvector."""
-        rest = self._solver.solve_adjoint_exactly(left) - left * nu.conj()
-        sizes = np.abs(nu) * np.linalg.norm(left, axis=0)
-        return bool((np.linalg.norm(rest, axis=0) <= TOLERANCE * sizes).all())
 
     def _farthest(self, radius: float) -> float:
         """Distance from ``sigma`` of the farthest point of the circle around ``centre``."""

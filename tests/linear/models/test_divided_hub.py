@@ -8,8 +8,8 @@ import scipy.sparse as sp
 from orchestrator.linear.models import divided_hub, hub_elimination, linear_model
 from orchestrator.linear.models.hub_elimination import DenseHub
 from orchestrator.linear.models.linear_model import LinearModel
-from orchestrator.linear.spectra import critical_modes, left_vectors
-from orchestrator.linear.spectra.block_arnoldi import BlockArnoldi
+from orchestrator.linear.spectra import critical_modes
+from orchestrator.linear.spectra.block_arnoldi import WIDTHS, BlockArnoldi
 from orchestrator.linear.spectra.critical_modes import Search, find_critical_modes
 from orchestrator.linear.spectra.modes import find_modes
 from tests.linear.models.test_hub_elimination import STATES, UNITS, system
@@ -140,19 +140,6 @@ def test_currents_of_one_bus_are_taken_together_and_what_no_other_says_is_kept()
     assert np.abs(L @ common - R).max() < 1e-13
 
 
-def searches(monkeypatch):
-    """Collect what is searched in blocks."""
-    begun = []
-
-    class Counted(BlockArnoldi):
-        def __init__(self, *given, **named):
-            begun.append(given)
-            super().__init__(*given, **named)
-
-    monkeypatch.setattr(critical_modes, "BlockArnoldi", Counted)
-    return begun
-
-
 def assert_left(model, pairs):
     assert pairs
     for value, left, right in pairs:
@@ -160,52 +147,52 @@ def assert_left(model, pairs):
         assert np.abs(model.A @ right - value * right).max() < 1e-6 * abs(right).max()
 
 
-def test_few_left_vectors_come_from_beside_their_eigenvalues_without_a_second_search(monkeypatch):
-    begun = searches(monkeypatch)
+def searched(monkeypatch):
+    """A search, its model, and the vectors of each search in its adjoint equations, once there is one."""
     model = along_a_line()
     search = Search(model, 2j * np.pi * 0.75)
-    values = search.reaching(0.6)
-    few = np.argsort(np.abs(values - search.centre))[:4].tolist()
-    assert_left(model, search.pairs(few))
-    assert len(begun) == 1
-    monkeypatch.setattr(left_vectors, "MOST_POINTS", 1)
-    assert_left(model, search.pairs(few))
-    assert len(begun) == 2
+    assert search.reaching(0.6) is not None
+    begun = []
+
+    class Counted(BlockArnoldi):
+        def __init__(self, *given, **named):
+            begun.append(self)
+            super().__init__(*given, **named)
+
+    monkeypatch.setattr(critical_modes, "BlockArnoldi", Counted)
+    return search, model, begun
 
 
-def test_a_point_next_to_an_eigenvalue_needs_few_solutions():
-    model = along_a_line()
-    search = Search(model, 2j * np.pi * 0.75)
-    values = search.reaching(0.6)
-    assert values is not None
-    solutions = []
-    solver_beside = LinearModel.solver_beside
-
-    def counted(self, sigma):
-        solve = solver_beside(self, sigma)
-        return lambda b: solutions.append(sigma) or solve(b)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(LinearModel, "solver_beside", counted)
-        nearest = int(np.argmin(np.abs(values - search.centre)))
-        assert_left(model, search.pairs([nearest]))
-    assert 2 <= len(solutions) <= 4
+def random_vectors(blocks, places):
+    return np.random.default_rng(3).standard_normal((STATES, len(places))) + 0j
 
 
-@pytest.mark.parametrize("wrong", ["random", "others"])
-def test_left_vectors_that_are_none_or_of_other_eigenvalues_are_noticed(wrong, monkeypatch):
-    def planted(model, sigma, nu):
-        if wrong == "random":
-            return np.random.default_rng(0).standard_normal((STATES, len(nu))) + 0j
-        return left_vectors.left_vectors(model, sigma, 1 / (1 / nu + 40.0))
-
-    begun = searches(monkeypatch)
-    monkeypatch.setattr(critical_modes, "left_vectors", planted)
-    model = along_a_line()
-    search = Search(model, 2j * np.pi * 0.75)
-    search.reaching(0.6)
+def test_left_vectors_are_found_from_the_right_ones_with_fewer_vectors(monkeypatch):
+    search, model, begun = searched(monkeypatch)
     assert_left(model, search.pairs([0, 1]))
-    assert len(begun) == 2
+    monkeypatch.setattr(BlockArnoldi, "duals", random_vectors)
+    assert_left(model, search.pairs([0, 1]))
+    from_right, from_random = (adjoint.count for adjoint in begun)
+    assert from_right < 0.7 * from_random
+
+
+def test_left_vectors_are_found_from_a_beginning_that_tells_nothing(monkeypatch):
+    search, model, _ = searched(monkeypatch)
+    monkeypatch.setattr(
+        BlockArnoldi, "duals", lambda blocks, places: 0 * random_vectors(blocks, places)
+    )
+    assert_left(model, search.pairs([0, 1]))
+
+
+def test_a_search_that_leads_nowhere_begins_anew_with_random_vectors(monkeypatch):
+    search, model, begun = searched(monkeypatch)
+    so_many = STATES // 2  # that there is room for one power of the operator
+    monkeypatch.setattr(
+        BlockArnoldi, "duals", lambda blocks, places: random_vectors(blocks, range(so_many))
+    )
+    monkeypatch.setattr(critical_modes, "MOST", so_many)
+    assert_left(model, search.pairs([0, 1]))
+    assert [adjoint.width for adjoint in begun] == [so_many, WIDTHS[0]]
 
 
 @pytest.mark.parametrize("kind", [float, complex])

@@ -86,6 +86,25 @@ def test_vectors_orthogonal_in_their_images_give_the_same_eigenvalues():
     assert (search.accuracy[:4] < 1e-10).all()
 
 
+def test_duals_hold_nothing_of_other_values_and_the_adjoint_turns_them_into_left_vectors():
+    """An operator on pairs of elements, each of which moves its partner."""
+    first, second = 1 / np.array([[1, 2], *np.linspace([20, 21], [900, 901], LONG // 2 - 1)]).T
+
+    def operator(x):
+        return np.vstack([first[:, None] * x[::2] + 3 * x[1::2], second[:, None] * x[1::2]])[order]
+
+    def adjoint(x):
+        return np.vstack([first[:, None] * x[::2], second[:, None] * x[1::2] + 3 * x[::2]])[order]
+
+    order = np.arange(LONG).reshape(2, -1).T.ravel()
+    search = searched(operator)
+    near, vectors = search.duals([1, 0]), search.vectors(range(20))
+    assert np.abs(near.conj().T @ vectors - np.eye(20)[[1, 0]]).max() < 1e-9
+    left = adjoint(adjoint(adjoint(adjoint(near))))
+    rest = adjoint(left) - left * search.values[[1, 0]].conj()
+    assert (np.linalg.norm(rest, axis=0) < 1e-3 * np.linalg.norm(left, axis=0)).all()
+
+
 def test_an_operator_that_turns_little_out_of_a_few_directions_leaves_the_basis_whole():
     turns = np.random.default_rng(2).standard_normal((2, LONG, 6)) / np.sqrt(LONG)
 
