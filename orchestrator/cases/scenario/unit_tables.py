@@ -41,6 +41,7 @@ from orchestrator.cases.networks.psse.dyr_units import (
 )
 from orchestrator.cases.networks.psse.dyr_uses import record_uses
 from orchestrator.cases.networks.psse.motor_loads import MotorLoad
+from orchestrator.cases.networks.psse.raw_network import unit_labels
 from orchestrator.cases.networks.psse.refusals import Refusals
 from orchestrator.cases.networks.psse.unused_models import unused_models
 from orchestrator.cases.networks.record_use import UseOfRecord
@@ -434,7 +435,9 @@ def _account(
     network = draft.given.case.network
     said = network.load_model if network else None
     among_phasors = table.generator.endswith(_PHASOR)
-    draft.found.questions += unused_models(records, uses, said, among_phasors=among_phasors)
+    draft.found.questions += unused_models(
+        records, uses, said, among_phasors=among_phasors, labels=unit_labels(machines)
+    )
     return motors.loads
 
 

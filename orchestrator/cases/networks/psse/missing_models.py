@@ -10,6 +10,7 @@ from fmus.synchronous_generator.dyr_records import DYR_RECORDS
 from orchestrator.cases.form.remedies import replacement_of, without_models
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.raw_network import Machine
+from orchestrator.core.options import Option
 
 MACHINE = "machine"
 DEVICE = "device"
@@ -24,6 +25,7 @@ OF_MACHINES = (
     "stabilizer",
     "compensator",
     "limiter",
+    "supervisor",
     "plant",
     "converter",
 )
@@ -35,6 +37,7 @@ _STANDS = {
     "stabilizer": "none, or [units] stabilizer",
     "compensator": "control of the machine's own voltage",
     "limiter": "none",
+    "supervisor": "constant references",
     "plant": "constant references",
     "plants": "constant references",
     "converter": "a converter of ours: [units.parameters], alpha = 1",
@@ -50,6 +53,7 @@ _MOVES = {
     "stabilizer": "much: it is there to damp these modes",
     "compensator": "little: it shifts the point whose voltage is held; a large X_c moves damping",
     "limiter": "not: it acts at limits only",
+    "supervisor": "little: it is slower than these modes",
     "plant": "little: it is slower than these modes",
     "plants": "little: it is slower than these modes",
     "converter": "much where converters carry much of the power",
@@ -115,15 +119,26 @@ def owner_of(record: DynamicRecord) -> str:
 
 
 @cache
-def _reasons() -> Mapping[str, str]:
-    path = Path(__file__).with_name("devices_without_model.toml")
+def _reasons(file: str) -> Mapping[str, str]:
+    path = Path(__file__).with_name(file)
     listed = tomllib.loads(path.read_text(encoding="utf-8"))
     return {name: reason for reason, names in listed.items() for name in str(names).split()}
 
 
 def reason_of_device(name: str) -> str:
     """Return why a compensator's or a DC line's record has no model; empty if that is not known."""
-    return _reasons().get(name, "")
+    return _reasons("devices_without_model.toml").get(name, "")
+
+
+def reason_of_limiter(name: str) -> str:
+    """Return why a record of a limiter of excitation has no part."""
+    return _reasons("limiters_without_model.toml")[name]
+
+
+def limiter_in_place(name: str, unit: str) -> str:
+    """Return what gives a unit one of our limiters in the place of a record, as it is typed."""
+    part = "uel=mnlex2" if name.startswith(("MNLEX", "UEL")) else "oel=maxex2"
+    return f"{Option.SET} sg{unit}.{part}"
 
 
 _RELAY = "relay"

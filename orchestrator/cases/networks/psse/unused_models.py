@@ -1,7 +1,7 @@
 """Questions about records of a DYR file that are of no machine: models of loads, of SVCs, of DC lines, and strays."""
 
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from fmus.dc_line.dyr_records import DC_LINE_RECORDS
 from orchestrator.cases.form.schema import LoadModelTable
@@ -13,8 +13,10 @@ from orchestrator.cases.networks.psse.missing_models import (
     OF_MACHINES,
     RESTS,
     kind_of,
+    limiter_in_place,
     owner_of,
     reason_of_device,
+    reason_of_limiter,
 )
 from orchestrator.cases.networks.psse.motor_loads import MOTOR_NAMES
 from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
@@ -47,11 +49,13 @@ def unused_models(
     said: LoadModelTable | None = None,
     *,
     among_phasors: bool = False,
+    labels: Mapping[tuple[int, str], str] | None = None,
 ) -> list[Problem]:
     """One question for each model that matters, with the lines of all its records.
 
     ``said``: how the case's loads follow the voltage; records that say the same are not asked about.
-    ``among_phasors``: whether the case's models are phasor models, which motors are alone."""
+    ``among_phasors``: whether the case's models are phasor models, which motors are alone. ``labels``: of the machines'
+    units, by bus and identifier; without them a unit has its bus' number."""
     if not records:
         return []
     changes = Changes(records[0].file)
@@ -84,9 +88,10 @@ def unused_models(
             for record in own:
                 changes.note(record.line, remark)
     for record in _named_in(records, uses, RESTS):
+        unit = (labels or {}).get((record.bus, record.machine), str(record.bus))
         text = (
-            f"{record.name} is {RESTS}, as no public source has both its diagram and its record's fields: it acts at "
-            "limits only. Does the machine start within them?"
+            f"{record.name} is {RESTS}: {reason_of_limiter(record.name)}. It acts at limits only; does the machine "
+            f"start within them? One of ours in its place: {limiter_in_place(record.name, unit)}"
         )
         changes.note(record.line, Remark(text, RESTS))
     for record in _named_in(records, uses, UNHEARD):

@@ -82,7 +82,8 @@ def test_models_that_are_missing_are_one_table(tmp_path):
         ["LCFB1", "1", "200", "line", "7"],
     ]
     assert "much: the voltage control" in text
-    assert "not: it acts at limits only" in text
+    assert "little: it is slower than these modes" in text
+    assert "constant references" in text
     assert "not known: gfor does not know what this model is" in text
     typed = "--dyr-leave-out URST5T --dyr-leave-out OWNGOV --dyr-leave-out LCFB1"
     assert (

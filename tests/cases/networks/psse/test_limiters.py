@@ -1,8 +1,12 @@
 """Limiters of excitation in dynamics data: parts of their machines, or not used because their exciter does not hear."""
 
+import tomllib
+from pathlib import Path
+
 import pytest
 
 from fmus.synchronous_generator.dyr_records import DYR_RECORDS
+from orchestrator.cases.networks.psse import missing_models
 from orchestrator.cases.networks.psse.dyr import machine_models
 from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.dyr_uses import record_uses
@@ -292,3 +296,27 @@ def test_a_limiter_that_may_go_is_left_out(tmp_path):
     model, uses, _ = read(tmp_path, GENROU + SEXS + MAXEX1, ["MAXEX1"])
     assert "oel" not in model.parts
     assert uses[-1].why == "dyr_leave_out names it"
+
+
+@pytest.mark.parametrize(
+    ("name", "reason", "typed"),
+    [
+        ("MNLEX1", "no public source gives its diagram", "--set sg1.uel=mnlex2"),
+        ("OEL5C", "no public source gives the order of its fields", "--set sg1.oel=maxex2"),
+        ("SCL1C", "no public source gives the order of its fields", "--set sg1.oel=maxex2"),
+    ],
+)
+def test_a_limiter_that_rests_is_told_with_the_reason_and_one_that_acts(
+    name, reason, typed, tmp_path
+):
+    _, _, asked = read(tmp_path, GENROU + SEXS + f"1 '{name}' 1 1 2 3 /\n")
+    (question,) = asked
+    assert f"{name} is a limiter of excitation, taken to rest" in str(question)
+    assert reason in str(question)
+    assert typed in str(question)
+
+
+def test_each_limiter_without_a_part_has_a_reason():
+    table = Path(missing_models.__file__).with_name("model_names.toml").read_text("utf-8")
+    names = {*tomllib.loads(table)["limiter"].split()} - {*DYR_RECORDS}
+    assert {name for name in names if missing_models.reason_of_limiter(name)} == names
