@@ -34,12 +34,15 @@ _FORMS = {
         "bus_fault",
         re.compile(
             r"(bus )?(?P<bus>[^,]+?)\s*,\s*(?P<duration>[^\s,]+\s*[mu]?s)(\s*,\s*(?P<kind>[123]-phase(-earth)?))?"
-            r"(\s*,\s*opens\s+(?P<cleared_by>[^,]+?))?(\s*,\s*recloses\s+after\s+(?P<reclose_after>\S+\s*[mu]?s))?"
+            r"(\s*,\s*opens\s+(?P<cleared_by>[^,]+?))?"
+            r"(\s*,\s*(the\s+)?other\s+end\s+after\s+(?P<other_end_after>\S+\s*[mu]?s))?"
+            r"(\s*,\s*recloses\s+after\s+(?P<reclose_after>\S+\s*[mu]?s))?"
             r"(\s*,?\s*from\s+(?P<time>\S+\s*[mu]?s))?"
         ),
         "'PLACE, DURATION', such as 'bus_9, 150 ms' or 'line_7_9 at 30 %, 100 ms'; the phases ('1-phase', '2-phase', "
         "'2-phase-earth'), what clears it ('opens line_7_9'; along a line 'opens it' or 'opens one pole'; at one end "
-        "alone 'opens line_7_9 at bus_7', 'opens it at bus_7', 'opens one pole at bus_7'; and 'recloses after 500 ms')",
+        "alone 'opens line_7_9 at bus_7', 'opens it at bus_7', 'opens one pole at bus_7'; along a line "
+        "'other end after 400 ms', counted from the fault's begin; and 'recloses after 500 ms')",
     ),
 }
 """Option → what it asks for, its form, and that in words."""
@@ -106,6 +109,11 @@ def event_of(option: Option, text: str) -> EventInWords:
         along = _ALONG.fullmatch(given.get("bus", ""))
         if along is not None:
             kind, name, given = LineFaultTable, "line_fault", _along_a_line(given, along)
+        elif "other_end_after" in given:
+            raise ValueError(
+                "'other end after' is of a fault along a line, which its other end goes on feeding: "
+                "'line_7_9 at 1 %' is one close to the bus"
+            )
         elif given.get("cleared_by") in _OPENED:
             raise ValueError(
                 f"opens {given['cleared_by']!r}: at a bus it names the line, as in 'opens line_7_9'; "

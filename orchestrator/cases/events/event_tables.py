@@ -119,13 +119,16 @@ def _endless(table: schema.EventTable, stop: float) -> Iterator[str]:
             if table.has_bare_duration
             else ""
         )
-        if table.time + table.duration > stop:
+        lasts = table.duration if table.lasts is None else table.lasts
+        if lasts > table.duration and table.time + lasts > stop:
+            yield f"other_end_after = {lasts:g} s: the fault is not cleared before the run stops at {stop:g} s"
+        elif table.time + table.duration > stop:
             yield f"{seen}: the fault is not cleared before the run stops at {stop:g} s{slip}"
         elif table.has_bare_duration and table.duration > _LONG_FAULT:
             yield f"{seen}, without a unit: a fault is cleared within a second{slip}, else '{table.duration:g} s'"
     reclosing = schema.LineTripTable | schema.LineFaultTable | schema.BusFaultTable
     reclose = table.reclose_after if isinstance(table, reclosing) else None
-    opened = table.time + (getattr(table, "duration", None) or 0.0)
+    opened = table.time + ((table.lasts if isinstance(table, schema.FaultBase) else None) or 0.0)
     if reclose is not None and opened + reclose > stop:
         yield f"reclose_after = {reclose:g} s: the line recloses only after the run, which stops at {stop:g} s"
 
@@ -150,15 +153,27 @@ def _elsewhere(table: schema.EventTable, network: Network | None) -> Iterator[st
             yield f"{text}, where the fault goes away; is its end at {table.bus} meant?"
 
 
+def _later(table: schema.LineFaultTable) -> str:
+    """Return how to say when the other end opens; "" where one phase opens, as a fault lasts no longer there."""
+    if table.opens == "pole":
+        return "is opens_at meant? "
+    return (
+        "other_end_after = '400 ms' in the event, in words 'other end after 400 ms', has it open so long after the "
+        "fault's begin, as by its zone 2; "
+    )
+
+
 def _beside_a_closed_end(table: schema.LineFaultTable, network: Network) -> Iterator[str]:
     """Questions about a fault along a line that ends as one end of the line opens."""
     line = next((line for line in network.lines if line.name == table.line), None)
     if table.opens_at is None or table.duration is None or line is None:
         return
+    if table.other_end_after is not None:
+        return
     other = line.to_bus if table.opens_at == line.from_bus else line.from_bus
     yield (
         f"{table.line} opens at {table.opens_at} alone: the fault along it ends with that, where a real one lasts "
-        f"until its end at {other} opens too; is opens_at meant? Without it the line opens at both ends"
+        f"until its end at {other} opens too; {_later(table)}without opens_at the line opens at both ends"
     )
 
 

@@ -119,6 +119,8 @@ def _line_fault(draft: Draft, table: schema.LineFaultTable, grid: str, where: st
     events: list[Event] = [begin]
     if table.duration is None:
         return events
+    if table.other_end_after is not None:
+        return [begin, *_end_by_end(draft, table, begin, where)]
     end = table.time + table.duration
     events.append(coupled.LineFault(end, grid, table.line, table.at, False))
     closed = None if table.reclose_after is None else end + table.reclose_after
@@ -127,6 +129,32 @@ def _line_fault(draft: Draft, table: schema.LineFaultTable, grid: str, where: st
         events += _opening(draft, line, table.opens_at, (end, table.reclose_after))
     elif table.opens == "pole" and closed is not None:
         events += _pole(draft, table, (grid, where), (end, closed))
+    return events
+
+
+def _end_by_end(
+    draft: Draft, table: schema.LineFaultTable, fault: coupled.LineFault, where: str
+) -> list[Event]:
+    """Return the opening of a faulted line at one end, later at the other with the fault's end, and its closing.
+
+    In between, the other end feeds the fault. One of fewer phases meets other networks then, and begins anew for that.
+    """
+    line, bus = _line(draft, table.line), table.opens_at
+    if line is None or bus is None or table.duration is None or table.other_end_after is None:
+        return []  # that there is no such line is noted with the fault
+    side = _side(draft, line, bus, where)
+    if side is None:
+        return []
+    times = table.time + table.duration, table.time + table.other_end_after
+    first = coupled.LineEndSwitching(times[0], fault.component, line.name, side, False)
+    last = replace(first, time=times[1], end="to" if side == "from" else "from")
+    events: list[Event] = [first]
+    if fault.kind != "3-phase":
+        events.append(replace(fault, time=times[0]))
+    events += [replace(fault, time=times[1], on=False), last]
+    if table.reclose_after is not None:
+        closing = times[1] + table.reclose_after
+        events += [replace(one, time=closing, connected=True) for one in (first, last)]
     return events
 
 

@@ -445,6 +445,11 @@ class FaultBase(GridEventBase):
         return self.duration is not None and self._bare
 
     @property
+    def lasts(self) -> float | None:
+        """Return how long the fault is there [s]; None if it stays."""
+        return self.duration
+
+    @property
     def end_bus(self) -> str | None:
         """Return the bus at which alone the line opens; None if it opens at both, or stays."""
         return self.opens_at
@@ -474,12 +479,21 @@ class BusFaultTable(FaultBase):
 
 class LineFaultTable(FaultBase):
     """A fault along a line, at a part of the way from its from bus; the line may open as the fault ends, with all
-    three phases or the faulted one, at both ends or at one of its buses alone, and close again."""
+    three phases or the faulted one, at both ends or at one of its buses alone, and close again.
+
+    Where its other end opens later, the fault lasts until then."""
 
     type: Literal["line_fault"]
     line: str
     at: Annotated[float, BeforeValidator(_share), Field(gt=0, lt=1)]
     opens: Literal["no", "line", "pole"] = "no"
+    # from the fault's begin to the opening of the end that is not at ``opens_at``
+    other_end_after: Seconds | None = Field(default=None, gt=0)
+
+    @property
+    def lasts(self) -> float | None:
+        """Return how long the fault is there [s]; None if it stays."""
+        return self.other_end_after or self.duration
 
     @model_validator(mode="after")
     def _is_one_story(self) -> Self:
@@ -493,6 +507,16 @@ class LineFaultTable(FaultBase):
             raise ValueError(
                 "'opens_at' needs 'opens': 'line' or 'pole', which opens at this bus alone"
             )
+        if self.other_end_after is not None:
+            if self.opens != "line" or self.opens_at is None:
+                raise ValueError(
+                    "'other_end_after' needs opens = 'line' and 'opens_at': the bus whose end opens first"
+                )
+            if self.duration is not None and self.other_end_after <= self.duration:
+                raise ValueError(
+                    f"other_end_after = {self.other_end_after:g} s is not after the first end, which opens at "
+                    f"{self.duration:g} s; both count from the fault's begin"
+                )
         if self.opens == "pole" and (self.kind != "1-phase" or self.reclose_after is None):
             raise ValueError(
                 "opens = 'pole' is for a fault of kind '1-phase', and needs 'reclose_after': the dead time"

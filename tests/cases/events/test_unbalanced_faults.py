@@ -130,8 +130,12 @@ class Phases:
         ):
             self.at(row, column, sign * y)
 
-    def add_lines(self, split=None, open_phase=None, *, open_at_from=False, pole_at=None):
+    def add_lines(
+        self, split=None, open_phase=None, *, open_at_from=False, pole_at=None, without=None
+    ):
         for name, (first, last, z) in LINES.items():
+            if name == without:
+                continue
             one, other = first, last
             if pole_at is not None and pole_at[0] == name:
                 one, other = self.with_open_pole(first, last, pole_at[1])
@@ -302,6 +306,39 @@ def test_a_fault_along_a_line_that_ends_as_one_end_opens_is_asked_about(opens, a
     assert any(said in str(q) for q in ready.questions) == asked
 
 
+@pytest.mark.parametrize("kind", ["1-phase", "2-phase-earth"])
+def test_the_other_end_feeds_a_fault_until_it_opens_too(kind, tmp_path):
+    """Against three phases: with one end open and the fault, with the line gone, and with it closed again."""
+    prepared(tmp_path, "")
+    fault = f"l31 at 40 %, 50 ms, {kind}, opens it at b3, other end after 200 ms, recloses after 100 ms, from 0.1 s"
+    (ready,) = with_events(load_case(tmp_path / "case.toml"), [], [fault]).prepare()
+    assert not [q for q in ready.questions if "where a real one lasts" in str(q)]
+    v, reference = compared(ready, 0.2)
+    reference.add_lines(split=("l31", 0.4), open_at_from=True)
+    reference.fault(3, kind, 1e-6j)
+    assert v == pytest.approx(reference.positive()[:3], rel=1e-3)
+    assert min(np.abs(v)) < 0.9
+    v, reference = compared(ready, 0.35)
+    reference.add_lines(without="l31")
+    assert v == pytest.approx(reference.positive()[:3], rel=1e-5)
+    v, reference = compared(ready, 0.45)
+    reference.add_lines()
+    assert v == pytest.approx(reference.positive()[:3], rel=1e-6)
+
+
+def test_a_balanced_fault_is_fed_by_the_end_that_opens_later(tmp_path):
+    """The same as two events that a planner types by hand: the end's trip, and a longer fault that opens the line."""
+    prepared(tmp_path, "")
+    case = load_case(tmp_path / "case.toml")
+    fault = "l31 at 40 %, 50 ms, opens it at b3, other end after 200 ms, from 0.1 s"
+    (ready,) = with_events(case, [], [fault]).prepare()
+    trip = '[[events]]\ntype = "line_trip"\ntime = "0.15 s"\nline = "l31"\nat = "b3"\n'
+    along = '[[events]]\ntype = "line_fault"\ntime = "0.1 s"\nline = "l31"\nat = 0.4\n'
+    by_hand = prepared(tmp_path, f'{trip}{along}duration = "200 ms"\nopens = "line"\n')
+    for time in (0.12, 0.2, 0.4):
+        assert compared(ready, time)[0] == pytest.approx(compared(by_hand, time)[0], rel=1e-9)
+
+
 @pytest.mark.parametrize(
     "fault",
     ["l31 at 40 %, 50 ms, opens it at b3", "b3, 50 ms, opens l31 at b3, from 0.2 s"],
@@ -365,6 +402,18 @@ def test_what_cannot_be_is_refused_by_name(tmp_path):
         ("at = 0.3\nopens_at = 'b2'", "'opens_at' needs 'opens'"),
         (
             "at = 0.3\nduration = '0.1 s'\nopens = 'line'\nopens_at = 'b1'",
+            "l23 joins b2 and b3, and has no end at 'b1'",
+        ),
+        (
+            "at = 0.3\nduration = '0.1 s'\nopens = 'line'\nother_end_after = '0.4 s'",
+            "'other_end_after' needs opens = 'line' and 'opens_at'",
+        ),
+        (
+            "at = 0.3\nduration = '0.1 s'\nopens = 'line'\nopens_at = 'b2'\nother_end_after = '0.1 s'",
+            "other_end_after = 0.1 s is not after the first end",
+        ),
+        (
+            "at = 0.3\nduration = '0.1 s'\nopens = 'line'\nopens_at = 'b1'\nother_end_after = '0.2 s'",
             "l23 joins b2 and b3, and has no end at 'b1'",
         ),
         ("at = 0.3\nduration = '0.1 s'\nopens = 'pole'", "opens = 'pole' is for a fault of kind"),
@@ -537,6 +586,10 @@ def test_a_screening_takes_an_open_end_as_a_value_of_a_point(tmp_path):
             {"at": 0.3, "opens": "line", "opens_at": "bus_7", "reclose_after": 1.0},
         ),
         (
+            "line_7_9 at 30 %, 100 ms, opens it at 7, other end after 400 ms from 2 s",
+            {"opens_at": "bus_7", "other_end_after": 0.4, "duration": 0.1, "time": 2.0},
+        ),
+        (
             "bus_7, 100 ms, opens line_7_9 at bus_7 from 2 s",
             {"bus": "bus_7", "cleared_by": "line_7_9", "opens_at": "bus_7", "time": 2.0},
         ),
@@ -563,6 +616,10 @@ def test_faults_in_words(text, keys):
         ("line_7_9 at 30 %, 100 ms, opens line_8", "'opens it' or 'opens one pole'"),
         ("line_7_9 at 30 %, 100 ms, opens one pole", "opens = 'pole' is for a fault of kind"),
         ("bus_9, 150 ms, opens it at bus_9", "opens 'it': at a bus it names the line"),
+        (
+            "bus_7, 100 ms, opens line_7_9 at bus_7, other end after 400 ms",
+            "'other end after' is of a fault along a line",
+        ),
         ("line_7_9 at 30 %, 100 ms, opens line_8 at bus_8", "'opens it' or 'opens one pole'"),
     ],
 )
