@@ -28,6 +28,7 @@ from orchestrator.studies.modes.naming import named_modes
 from orchestrator.studies.operating_points.bench import PointBench
 from orchestrator.studies.operating_points.item import Item, Status
 from orchestrator.studies.operating_points.preparation import ACCEPT, ItemPreparation, failure
+from orchestrator.studies.operating_points.widening import started
 from orchestrator.studies.points.codec import plain
 from orchestrator.studies.points.failure import Failure
 from orchestrator.studies.points.task import Kept, Task, computed
@@ -173,9 +174,11 @@ def _points(
     for item in task.items:
         warnings: tuple[str, ...] = ()
         try:
-            prepared = preparation.prepared(item).scenario
-            warnings = preparation.warnings(prepared)
-            found = _at(case, bench, bench.master(prepared), task.places, warnings)
+            prepared = preparation.prepared(item)
+            warnings = preparation.warnings(prepared.scenario)
+            start = started(bench, preparation, item, prepared)
+            warnings = (*warnings, *map(str, start.widenings))
+            found = _at(case, bench, start.master, task.places, warnings)
         except (
             Exception
         ) as error:  # an error that nobody expected must neither end the other points nor be hidden

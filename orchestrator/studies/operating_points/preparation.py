@@ -103,8 +103,10 @@ class ItemPreparation:
         self._sharing = sharing or SharingRule(table.sharing if table else "droop")
         self._before: tuple[int, PreparedScenario] | None = None
 
-    def prepared(self, item: Item) -> PreparedItem:
-        """The scenario at an item, without the units that are out of service."""
+    def prepared(self, item: Item, wider: Mapping[str, float] | None = None) -> PreparedItem:
+        """The scenario at an item, without the units that are out of service.
+
+        ``wider``: limits of exciters and governors by which the item starts, in the place of the case's own."""
         valued = self._valued(item)
         remains = what_remains(valued, self.elements, item.out)
         if remains.why_none:
@@ -127,8 +129,8 @@ class ItemPreparation:
             dispatch = Dispatch(self._sharing, before.power_flow.powers, fed - drawn)
         elif new := [bus for bus in remains.dead if bus not in without.dead]:
             text = f"{few(new, _SHOWN)} cut off, with neither load nor unit"
-        values = {**item.values, **switched_off(item.out, remains, valued, self.elements)}
-        found = self._prepare(values, dispatch, voltages_before)
+        off = switched_off(item.out, remains, valued, self.elements)
+        found = self._prepare({**item.values, **off, **(wider or {})}, dispatch, voltages_before)
         if dispatch is not None:
             assert found.power_flow is not None
             plans, load = (

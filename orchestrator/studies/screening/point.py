@@ -12,8 +12,6 @@ import numpy as np
 from orchestrator.cases.case import Case, with_protection
 from orchestrator.cases.flow.sharing import SharingRule
 from orchestrator.cases.networks.branch_limits import Loading, Outlier, loadings, outliers
-from orchestrator.cases.scenario.prepare import PreparedScenario
-from orchestrator.core.errors import StartError
 from orchestrator.linear.models.apart import standing_apart
 from orchestrator.linear.models.linearization import Blocks
 from orchestrator.linear.models.slope_linearization import gives_slopes
@@ -28,6 +26,7 @@ from orchestrator.studies.operating_points.preparation import (
     failure,
     with_moving_controls,
 )
+from orchestrator.studies.operating_points.widening import StartedItem, started
 from orchestrator.studies.points.codec import plain
 from orchestrator.studies.points.failure import Failure
 from orchestrator.studies.points.parts_done import tell_part
@@ -232,20 +231,23 @@ class _Worker:
             warnings = self._preparation.warnings(prepared.scenario)
             if item.out:
                 warnings = (*warnings, *self._preparation.held_fields(prepared.scenario))
-            found = self._modes(prepared.scenario, neighbour, warnings, count=count)
+            start = started(self._bench, self._preparation, item, prepared)
+            prepared = start.prepared
+            found = self._modes(start, neighbour, warnings, count=count)
             beyond, fed = (
                 self._preparation.overloads(prepared.scenario),
                 self._preparation.reactive(prepared.scenario),
             )
             found.record = replace(
                 found.record,
-                text=prepared.text,
+                text="; ".join(filter(None, (prepared.text, *map(str, start.widenings)))),
                 beyond=beyond,
                 of_rating=self._preparation.warnings_of_rating(prepared.scenario, beyond),
                 reactive=fed,
                 loadings=loaded,
                 outliers=outside,
                 has_flow=flow is not None,
+                widenings=start.widenings,
             )
             return found
         except (
@@ -260,19 +262,18 @@ class _Worker:
                 outliers=outside,
                 has_flow=flow is not None,
                 lasting=lasting,
-                wider=error.wider if isinstance(error, StartError) else {},
             )
             return _Result(record)
 
     def _modes(
         self,
-        prepared: PreparedScenario,
+        start: StartedItem,
         neighbour: FoundModes | None,
         warnings: tuple[str, ...],
         *,
         count: bool,
     ) -> _Result:
-        master = self._bench.master(prepared)
+        prepared, master = start.prepared.scenario, start.master
         point = find_operating_point(master, accept=ACCEPT)
         wanted = self._task.wanted
         if not all(gives_slopes(exchange) for exchange in master.exchanges.values()):

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from orchestrator.cases.networks.branch_limits import Loading, Outlier
 from orchestrator.linear.spectra.mode_tracking import ModeSet
 from orchestrator.studies.operating_points.item import Status
+from orchestrator.studies.operating_points.widening import Widening
 from orchestrator.studies.points.task import Kept
 
 
@@ -109,8 +110,7 @@ class ItemRecord:
     # communication steps of the map whose modes these are; 0 of the system without a communication step
     map_steps: int = 0
     run: OutageRun | None = None  # the outage as it happens, where that was asked for
-    # values of limits, by ``component.variable``, with which all start that refuse to; empty where others do as well
-    wider: dict[str, float] = field(default_factory=dict)
+    widenings: tuple[Widening, ...] = ()  # limits beyond which the operating point lies
 
 
 @dataclass(frozen=True)

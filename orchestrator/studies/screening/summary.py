@@ -114,6 +114,7 @@ class Summary:
         self.tripping = [item for item, run in ran if run is not None and run.trips]
         self.gone_wrong = [item for item, run in ran if run is not None and run.went_wrong]
         self.free = [item for item in result.items if item.record.zeros > 1]
+        self.widened = [item for item in result.items if item.record.widenings]
         self.modes = self._modes()
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import asdict
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,6 @@ from typing import Any
 import numpy as np
 from rich.markup import escape as escape_markup
 
-from orchestrator.cases.form.control_limits import is_wider
 from orchestrator.cases.settings.layers import joined_values
 from orchestrator.core.errors import Problem, few, number_of
 from orchestrator.core.late import pd
@@ -55,10 +55,12 @@ from orchestrator.studies.screening.summary import (
 )
 from orchestrator.studies.screening.trips import run_columns, runs_json, runs_table
 from orchestrator.studies.screening.words import (
+    WIDENED,
     OutageRow,
     above_the_range,
     by_outage,
     growth_in_short,
+    question_of_widenings,
     verdict_of,
     verdict_sentence,
     what_was_counted,
@@ -340,13 +342,22 @@ def _cell(item: ScreenedItem | None, wanted: float) -> str | Marked:
     if item is None or item.record.status is not Status.COMPUTED:
         return "–" if item is None else str(item.record.status)
     least, above = least_of(item), less_damped_above(item, wanted)
+    mark = WIDENED if item.record.widenings else ""
     if item.record.stable is False:
-        return Marked(f"{least.damping:.2f} UNSTABLE" if least else "UNSTABLE", "bad")
+        return Marked(f"{least.damping:.2f} UNSTABLE{mark}" if least else f"UNSTABLE{mark}", "bad")
     if above is None:
-        return f"> {wanted:g}" if least is None else damping(least.damping)
+        return f"> {wanted:g}{mark}" if least is None else _with_mark(least.damping, mark)
     within = f"> {wanted:g}" if least is None else f"{least.damping:.2f}"
-    text = f"{within}; {above.frequency:.2f} Hz above the range: {above.damping:.2f}"
+    text = f"{within}; {above.frequency:.2f} Hz above the range: {above.damping:.2f}{mark}"
     return Marked(text, "bad") if above.damping < LEAST_DAMPING else text
+
+
+def _with_mark(value: float, mark: str) -> str | Marked:
+    """Return a damping [%] with a mark behind it, in the colour that it has without."""
+    text = damping(value)
+    if not mark:
+        return text
+    return Marked(f"{text.text}{mark}", text.mark) if isinstance(text, Marked) else f"{text}{mark}"
 
 
 def no_modes(summary: Summary) -> str:
@@ -411,35 +422,6 @@ def _cause(summary: Summary, item: ScreenedItem) -> str:
     return text
 
 
-def widest(items: Sequence[ScreenedItem]) -> dict[str, float]:
-    """Return limits with which the units of all items start that start with wider limits at all, each at its widest."""
-    found: dict[str, float] = {}
-    for item in items:
-        for name, value in item.record.wider.items():
-            if name not in found or is_wider(name, value, found[name]):
-                found[name] = value
-    return found
-
-
-def with_widest(text: str, first: ScreenedItem, items: Sequence[ScreenedItem]) -> str:
-    """Have an item's reason name the limits that serve all items, where they are wider than its own."""
-    every = widest(items)
-    for name, value in first.record.wider.items():
-        text = text.replace(_typed(name, value), _typed(name, every[name]))
-    return text
-
-
-def all_start_with(items: Sequence[ScreenedItem]) -> str:
-    """Tell with which limits several items start, as one line that is typed once; "" for fewer than two."""
-    number = sum(bool(item.record.wider) for item in items)
-    typed = " ".join(_typed(name, value) for name, value in widest(items).items())
-    return f"  {number} of these {len(items)} start with {typed}" if number > 1 else ""
-
-
-def _typed(name: str, value: float) -> str:
-    return f"{Option.SET} {name}={value:g}"
-
-
 def _places(summary: Summary, items: Sequence[ScreenedItem]) -> str:
     """The items of one cause: the first in full, the outages and the points of all."""
     if len(items) == 1:
@@ -472,18 +454,15 @@ def _of_relays(summary: Summary) -> str:
 
 
 def remarks(summary: Summary) -> list[str]:
-    texts = [*filter(None, [_of_controls(summary), _of_relays(summary)])]
+    told = (question_of_widenings(summary), _of_controls(summary), _of_relays(summary))
+    texts = [*filter(None, told)]
     for status, number in summary.counts.items():
         if status is Status.COMPUTED:
             continue
         named = [item for item in summary.failures() if item.record.status is status]
         texts.append(f"{status}: {number} of {len(summary.result.items)}:")
         causes = kinds_of((item, [_cause(summary, item)]) for item in named)
-        texts += [
-            f"  {_places(summary, items)}: {with_widest(text, items[0], named)}"
-            for text, items in causes
-        ]
-        texts += filter(None, [all_start_with(named)])
+        texts += [f"  {_places(summary, items)}: {text}" for text, items in causes]
     every = summary.result.items
     kinds = kinds_of((item, _not_said_yet(item)) for item in every)
     texts += [
@@ -520,6 +499,7 @@ def as_json(summary: Summary) -> dict[str, Any]:
         "nothing_restores": free,
         "counts": {str(status): number for status, number in summary.counts.items()},
         "beyond_rating": summary.beyond or None,
+        "widened_limits": list(map(_widened_json, summary.widened)),
         "limits": limits_json(summary),
         "runs": runs_json(summary),
         "above_the_range": above_the_range(summary) or None,
@@ -527,6 +507,10 @@ def as_json(summary: Summary) -> dict[str, Any]:
         "failures": failures,
         "modes": list(map(_mode_json, summary.modes)),
     }
+
+
+def _widened_json(item: ScreenedItem) -> dict[str, Any]:
+    return _where(item) | {"limits": [asdict(one) for one in item.record.widenings]}
 
 
 def _mode_json(mode: ScreenedMode) -> dict[str, Any]:

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from orchestrator.cases.new.widened_limits import HEADROOM
+from orchestrator.core.errors import few
 from orchestrator.core.options import Option, command
+from orchestrator.core.spelling import Text
 from orchestrator.linear.spectra.critical_modes import DENSE
 from orchestrator.linear.spectra.shifted_equations import GROWING
 from orchestrator.linear.spectra.stability import zeros_in_words
@@ -17,12 +20,18 @@ from orchestrator.studies.operating_points.line_ends import LineEnd
 from orchestrator.studies.operating_points.outages import Outage
 from orchestrator.studies.operating_points.point_columns import Elements
 from orchestrator.studies.operating_points.points_file import OperatingCase
+from orchestrator.studies.operating_points.widening import widest
 from orchestrator.studies.operating_points.words import ONE_ITEM, all_items, counted_items
 from orchestrator.studies.screening.modes import LOCAL_HZ, UNSTABLE
 from orchestrator.studies.screening.record import ItemRecord
 from orchestrator.studies.screening.study import ScreenedItem, ScreeningPlan
 from orchestrator.studies.screening.summary import ModeAt, Summary, least_of, where
 from orchestrator.studies.screening.trips import runs_sentence
+
+WIDENED = " (limit widened)"
+"""Marks an item that was computed with wider limits than the case has."""
+
+_NAMED = 4  # limits, or their units, that are named
 
 
 @dataclass(frozen=True)
@@ -177,7 +186,7 @@ def verdict_of(summary: Summary) -> VerdictSentence:
     total, planned = len(summary.result.items), summary.result.plan.number_of_items
     if summary.unstable:
         worst = min(summary.unstable, key=_rank)
-        told = (not_judged(summary), runs_sentence(summary), summary.beyond)
+        told = (not_judged(summary), runs_sentence(summary), summary.beyond, _widened(summary))
         lost = "".join(f"; {text}" for text in told if text)
         at = f"at {counted_items(len(summary.unstable), total, planned)}; worst: {where(summary, worst)}"
         text = f"{at}{_least(worst)}{lost}"
@@ -195,7 +204,7 @@ def verdict_of(summary: Summary) -> VerdictSentence:
         zeros = zeros_in_words(first.record.zeros)
         tail += f"; at {len(summary.free)} of them, first at {where(summary, first)}, {zeros}"
     ran = runs_sentence(summary)
-    tail += "".join(f"; {text}" for text in (ran, summary.beyond) if text)
+    tail += "".join(f"; {text}" for text in (ran, summary.beyond, _widened(summary)) if text)
     if summary.stable:
         text = f"nothing grows at {all_items(total, 'any of')}{_but_slowly(summary)}{tail}"
         return VerdictSentence(True, "stable", text)
@@ -218,6 +227,39 @@ def verdict_of(summary: Summary) -> VerdictSentence:
     missing += [f"what relays leave at {tripping} of them is not judged"] if tripping else []
     known = f"nothing grows at {counted_items(computed, total, planned)}, but " if computed else ""
     return VerdictSentence(None, "not known", f"{known}{', '.join(missing)}{tail}")
+
+
+def _widened(summary: Summary) -> str:
+    """At how many items limits were widened, of which units; "" where none was."""
+    items = summary.widened
+    if not items:
+        return ""
+    units = {one.name.partition(".")[0]: None for item in items for one in item.record.widenings}
+    judged = summary.counts[Status.COMPUTED]
+    at = counted_items(len(items), judged)
+    return f"at {at} a limit is widened to what the point asks for ({few(units, _NAMED)})"
+
+
+def question_of_widenings(summary: Summary) -> str:
+    """Ask about the limits that items were computed without, and give the values that answer it; "" where none was."""
+    items = summary.widened
+    if not items:
+        return ""
+    each = widest(one for item in items for one in item.record.widenings)
+    told = few(map(str, each.values()), _NAMED)
+    typed = Text("")
+    for name, one in each.items():
+        typed += " " + Option.SET + f" {name}={one.taken:g}"
+    at = f"{len(items)} of {len(summary.result.items)}, first {where(summary, items[0])}"
+    return Text(
+        f"question: at {at}, the point asks more of an exciter or governor than its limit gives: {told}. Their modes "
+        f"are computed with the limit {HEADROOM:g} pu beyond the start; PSS/E would warn of suspect initial conditions "
+        "and drift to the limit, where that loop is open and the voltage or the power is not held: ",
+        Option.TRIPS + " '10 s'",
+        " runs these outages with the limits as they are; is a limit wrong in the data? If the wider ones are meant, "
+        "type",
+        typed,
+    )
 
 
 def _least_of_all(summary: Summary) -> str:

@@ -24,6 +24,7 @@ from orchestrator.studies.screening.request import ScreeningRequest
 from orchestrator.studies.screening.study import plan_screening, run_screening
 from orchestrator.studies.screening.summary import Summary
 from orchestrator.studies.screening.view import as_json, remarks
+from orchestrator.studies.screening.words import verdict_sentence
 from tests.cases.new.test_widened_limits import new_case
 from tests.studies.screening.five_machines import DROOPS, POWERS, RATINGS, five_machines
 
@@ -328,8 +329,8 @@ def test_all_that_cannot_be_shared_is_named(tmp_path):
     assert all("would need" in one["why"] for one in failures)
 
 
-def test_limits_that_are_typed_once_let_all_items_start(tmp_path):
-    """The reason of the first outage named its own limit, and the next outage was refused with it."""
+def test_an_item_beyond_a_limit_is_computed_with_the_limit_widened_and_told(tmp_path):
+    """PSS/E warns and goes on. The modes are those of the same limits typed; the question names them once for all."""
     case = load_case(new_case(tmp_path, exciter="0.05 -5.0 0.9 /"))
     outages = "sg1,sg2,sg3,line_14_15"
 
@@ -338,18 +339,23 @@ def test_limits_that_are_typed_once_let_all_items_start(tmp_path):
         return Summary(run_screening(plan, Work(Serial(), PointStore(tmp_path / "points"))))
 
     found = summary_with({})
-    refused = [item for item in found.failures() if item.record.wider]
-    assert len(refused) > 1
-    assert len({tuple(item.record.wider.items()) for item in refused}) > 1
-    *reasons, last = (line for line in remarks(found) if "--set" in line)
-    assert last.startswith(f"  {len(refused)} of these {len(refused)} start with --set ")
-    typed = dict(_set_in(last))
-    assert all(value == typed[name] for line in reasons for name, value in _set_in(line))
-    assert not list(summary_with({name: float(value) for name, value in typed.items()}).failures())
-
-
-def _set_in(line):
-    return re.findall(r"--set (\S+)=([\d.]+)", line)
+    assert not list(found.failures())
+    beyond = found.widened
+    assert 1 < len(beyond) < len(found.result.items)
+    assert len({item.record.widenings for item in beyond}) > 1
+    assert all(0.9 <= one.given < one.taken for item in beyond for one in item.record.widenings)
+    assert f"at {len(beyond)} of 5 points and outages a limit is widened" in verdict_sentence(found)
+    (question,) = (line for line in remarks(found) if line.startswith("question: at"))
+    typed = {name: float(value) for name, value in re.findall(r"--set (\S+)=([\d.]+)", question)}
+    widest = {one.name: one.taken for item in beyond for one in item.record.widenings}
+    assert set(typed) == set(widest)
+    again = summary_with(typed)
+    assert not again.widened
+    assert not any(line.startswith("question: at") for line in remarks(again))
+    for one, other in zip(found.result.items, again.result.items, strict=True):
+        assert critical(one) == pytest.approx(critical(other), rel=1e-6)
+    shown = {item["outage"] for item in as_json(found)["widened_limits"]}
+    assert shown == {item.outage.name for item in beyond}
 
 
 def test_what_cannot_be_shared_says_who_would_need_how_much(five, tmp_path):

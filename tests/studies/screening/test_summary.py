@@ -17,7 +17,13 @@ def summary(*verdicts, complete=True):
     """Of items that are stable, unstable or without a verdict (None)."""
     records = [
         SimpleNamespace(
-            status=Status.COMPUTED, stable=v, zeros=0, critical=(), counted=True, run=None
+            status=Status.COMPUTED,
+            stable=v,
+            zeros=0,
+            critical=(),
+            counted=True,
+            run=None,
+            widenings=(),
         )
         for v in verdicts
     ]
