@@ -1,6 +1,6 @@
 """Dead bands about the operating point: a control's loop has no gain within one, so that modes do not show it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from orchestrator.cases.draft import Draft
@@ -55,16 +55,33 @@ _BANDS = {
 """By the scope of their parameters in a component."""
 
 
-def dead_band_doubts(draft: Draft) -> Iterator[UnusualValue]:
-    """Ask about each dead band about the operating point, and tell how to see its loop in modes."""
-    for name, plan in draft.system.components.items():
+@dataclass(frozen=True, slots=True)
+class RestingLoop:
+    """A loop that rests within its dead band: its component, the variables of the band's ends, and what it does."""
+
+    component: str
+    ends: tuple[str, ...]
+    loop: str
+
+
+def resting_loops(components: Mapping[str, ComponentPlan]) -> Iterator[RestingLoop]:
+    """Yield the loops that rest within a dead band at the operating point, and act beyond it."""
+    for name, plan in components.items():
         for scope, bands in _BANDS.items():
             for band in bands:
                 if band.hides(plan, scope):
-                    yield _doubt(draft, name, [f"{scope}{end}" for end in band.ends], band.loop)
+                    ends = tuple(f"{scope}{end}" for end in band.ends)
+                    yield RestingLoop(name, ends, band.loop)
 
 
-def _doubt(draft: Draft, name: str, ends: list[str], loop: str) -> UnusualValue:
+def dead_band_doubts(draft: Draft) -> Iterator[UnusualValue]:
+    """Ask about each dead band about the operating point, and tell how to see its loop in modes."""
+    for one in resting_loops(draft.system.components):
+        yield _doubt(draft, one)
+
+
+def _doubt(draft: Draft, one: RestingLoop) -> UnusualValue:
+    name, ends, loop = one.component, one.ends, one.loop
     plan = draft.system.components[name]
     given = " and ".join(f"{end} = {value_of(plan, end):g}" for end in ends)
     without = " ".join(Option.SET + f" {name}.{end}=0" for end in ends)
@@ -73,4 +90,4 @@ def _doubt(draft: Draft, name: str, ends: list[str], loop: str) -> UnusualValue:
         f"it; what it does beyond, such as an oscillation across the band, the modes with {without} show"
     )
     place = place_of(draft, name, *ends)
-    return UnusualValue(f"{name}.{ends[0]}", place, text, f"a dead band ({loop})", tuple(ends[1:]))
+    return UnusualValue(f"{name}.{ends[0]}", place, text, f"a dead band ({loop})", ends[1:])

@@ -31,6 +31,7 @@ from orchestrator.linear.spectra.modes import damping_ratio, in_range
 from orchestrator.output.results.lock import hold_folder
 from orchestrator.studies.modes import beside
 from orchestrator.studies.modes.all_modes import compute_all_modes
+from orchestrator.studies.modes.dead_band_weight import growth_beyond_dead_bands
 from orchestrator.studies.modes.load_model_weight import load_model_weights
 from orchestrator.studies.modes.modes import ModesResult, modes_json
 from orchestrator.studies.modes.request import ModesRequest
@@ -105,6 +106,8 @@ def _compute(
     weights = (
         [] if options.black_box else load_model_weights(scenarios, results, request.frequencies)
     )
+    if not options.black_box:
+        weights += growth_beyond_dead_bands(results)
     written, said = [], [*beside.sentences_beside(results)]
     if folder:
         from orchestrator.studies.runs.files import write_modes  # noqa: PLC0415 - plots: a second to import
