@@ -28,11 +28,12 @@ from orchestrator.studies.validation.filled import Mask, runs_of
 from orchestrator.studies.validation.frames import frames_of, grid_of_frames
 from orchestrator.studies.validation.held_by_samples import fastest_corner, is_too_fast
 from orchestrator.studies.validation.other_event import ask_of_other_event
-from orchestrator.studies.validation.out_of_step import step_loss
+from orchestrator.studies.validation.out_of_step import slip, step_loss
 from orchestrator.studies.validation.parameters import NEVER
 from orchestrator.studies.validation.plant_out_of_step import plant_loss
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.record import PortBases, Recording, questions_of_level
+from orchestrator.studies.validation.second_event import second_event
 from orchestrator.studies.validation.setpoint import ask_of_setpoint, without_step
 from orchestrator.studies.validation.smoothed import ask_of_smoothing
 from orchestrator.studies.validation.trend import trend_of
@@ -53,7 +54,12 @@ _SUCH = 3  # times of a device that are named, which the samples do not show
 _SHORT_GAP = 0.02  # [s]: over a period voltages are means, and a gap hides little
 _IN_GAP = 0.3  # part of the largest change of the voltage, from which on a gap hides an event
 _FEWEST_BEFORE = 30  # samples before an event that a part of the recording keeps
-_ENDS = (QuestionKind.OUT_OF_STEP, QuestionKind.PLANT_OUT_OF_STEP, QuestionKind.ANGLE_JUMP)
+_ENDS = (
+    QuestionKind.OUT_OF_STEP,
+    QuestionKind.SLIP,
+    QuestionKind.PLANT_OUT_OF_STEP,
+    QuestionKind.ANGLE_JUMP,
+)
 _OF_SAMPLES = ("voltage", "power", "good", "driven")
 
 
@@ -149,6 +155,11 @@ def prepare_event(
     asked += questions_of_level(recording, abs(voltage), start.power, bases)
     asked += _of_windows(recording, windows, before)
     asked += ask_of_smoothing(recording, windows)
+    second = second_event(recording, windows)
+    if second is not None:
+        windows = replace(windows, second=second)
+        figures = {"at": recording.begin + second, "first": recording.begin + windows.begin}
+        asked.append(Question(QuestionKind.SECOND_EVENT, figures))
     unique = {one.kind: one for one in reversed(asked)}
     return RecordedEvent(recording, windows, start, tuple(reversed(unique.values())))
 
@@ -164,13 +175,16 @@ def cut_event(event: RecordedEvent, after: float, before: float = math.inf) -> R
         cut["sampled"] = whole.sampled[first:stop]
     earlier = first * whole.interval
     recording = replace(whole, begin=whole.begin + earlier, **cut)
-    first_end = None if windows.first_end is None else windows.first_end - earlier
+    first_end, second = (
+        None if one is None else one - earlier for one in (windows.first_end, windows.second)
+    )
     moved = replace(
         windows,
         begin=windows.begin - earlier,
         end=windows.end - earlier,
         length=recording.length,
         first_end=first_end,
+        second=second if second is not None and second < recording.length else None,
     )
     return replace(event, recording=recording, windows=moved)
 
@@ -402,10 +416,13 @@ def _of_plant(comparison: EventComparison) -> list[Question]:
 
 
 def _of_step(comparison: EventComparison) -> list[Question]:
-    """A model that falls out of step where the plant did not."""
+    """A model that falls out of step where the plant did not; a note where it comes back, or hardly feeds any power."""
     event = comparison.event
     recording = event.recording
     loss = step_loss(recording, event.windows, comparison.played.power)
+    slips = None if loss else slip(recording, event.windows, comparison.played.power)
+    if slips is not None:
+        return [Question(QuestionKind.SLIP, {"at": recording.begin + slips})]
     if loss is None:
         return []
     figures = {"at": recording.begin + loss.time, "own": loss.own, "seen": loss.seen}

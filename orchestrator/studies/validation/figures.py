@@ -261,10 +261,11 @@ def delay_between(
 
 
 def step_of(recording: Recording, values: Numbers, windows: Windows) -> StepFigures | None:
-    """A step from before the event to the end of the recording; None where there is none."""
-    times = recording.times
+    """A step from before the event to the end of what follows it; None where there is none."""
+    own = recording.times <= windows.until
+    times, values = recording.times[own], values[own]
     before = float(values[windows.part("before", times)].mean())
-    late = times >= recording.length - _AT_END * (recording.length - windows.begin)
+    late = times >= windows.until - _AT_END * (windows.until - windows.begin)
     step = float(values[late].mean()) - before
     if abs(step) < _LEAST_MOVES or 2 * abs(step) < np.ptp(values[late]):
         return None
@@ -362,7 +363,7 @@ def _other_looks(
     """The same modes, measured and simulated, as each other look at the ring-down shows them.
 
     With fewer exponentials than all strong modes take, a look would lose one of them by itself."""
-    rest, least = recording.length - windows.end, 2 * len(sought[0])
+    rest, least = windows.until - windows.end, 2 * len(sought[0])
     looks = _OTHER_LOOKS_AT_SEVERAL if len(sought[0]) > 1 else _OTHER_LOOKS
     for part, more in looks:
         later = replace(windows, end=windows.end + part * rest)
@@ -387,7 +388,7 @@ def _doubt_of_mode(found: ModePair, looks: Sequence[ModePair]) -> tuple[float, f
 
 def _ringing(recording: Recording, values: Numbers, windows: Windows) -> xr.DataArray | None:
     """The part of a signal after the event, thinned; None where it is short or hardly moves."""
-    end = recording.times[-1] - _LAST * (recording.times[-1] - windows.end)
+    end = windows.until - _LAST * (windows.until - windows.end)
     part = (recording.times > windows.end) & (recording.times < end)
     if part.sum() < _FEW or np.ptp(values[part]) < _LEAST_MOVES:
         return None
@@ -411,7 +412,7 @@ def _modes(
         found = identify(curve, order=order)
     except CosimError:
         return []
-    slowest = _SLOWEST_PERIODS / (recording.length - windows.end)
+    slowest = _SLOWEST_PERIODS / (windows.until - windows.end)
     fastest = 0.25 / float(np.median(np.diff(times)))
     return [one for one in found if slowest < one.frequency_hz < fastest]
 

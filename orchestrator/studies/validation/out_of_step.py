@@ -20,6 +20,10 @@ _IN_STEP = 0.4  # part of the plant's largest movement by which a model in step 
 _LEAST_IN_STEP = 0.05  # power by which it may be off as well [pu of the rating]
 _SHORTEST = 0.3  # time for which it is off, to the end of the recording [s]
 _LEAST_BEFORE = 0.3  # time after the event's begin in which it was in step [s]
+_LEAST_CURRENT = 0.1  # current [pu of the rating] below which its angle says nothing
+_BESIDE = 0.25  # turns within which the currents of model and plant are in step
+_PASSES = 0.55  # turns by which a model leaves its plant: half a turn and the ringing of both
+_SHORT_MEAN = 0.04  # time over which currents are looked at, two periods of 50 Hz [s]
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,38 @@ def step_loss(recording: Recording, windows: Windows, simulated: Complex) -> Ste
         return None
     own, seen = (float(one.real[-apart:].mean()) for one in (simulated, recording.power))
     return StepLoss(float(recording.interval * (first + last)), own, seen)
+
+
+def slip(recording: Recording, windows: Windows, simulated: Complex) -> float | None:
+    """Find the moment until which a model is in step [s], whose current passes the opposite of the plant's after it.
+
+    So falls a model that comes back after a whole turn, or of little power. What turns while one of both currents is
+    small is not told: a power that changes its sign goes through zero, and turns by half a turn as well."""
+    width = max(1, round(_SHORT_MEAN / recording.interval))
+    first = int(windows.begin / recording.interval)
+    seen, own = (
+        _smooth(one / np.maximum(np.abs(recording.voltage), _LEAST_CURRENT), width)
+        for one in (recording.power, simulated)
+    )
+    large = (np.abs(seen) > _LEAST_CURRENT) & (np.abs(own) > _LEAST_CURRENT)
+    wanted = range(max(0, first - width), len(large))
+    told = np.array([k for k in wanted if large[k]], dtype=int)
+    if len(told) < width:
+        return None
+    turns = np.unwrap(np.angle(own[told] / seen[told])) / (2 * np.pi)
+    lost = np.flatnonzero((np.diff(told) > 1) & (np.abs(np.diff(turns)) > _BESIDE))
+    turns = turns[: lost[0] + 1] if len(lost) else turns
+    far = np.flatnonzero(np.abs(turns) > _PASSES)
+    near = np.flatnonzero(np.abs(turns[: far[0]]) < _BESIDE) if len(far) else far
+    if not len(near) or abs(turns[0]) > _BESIDE:
+        return None
+    moment = float(recording.interval * told[near[-1]])
+    return moment if moment > windows.begin else None
+
+
+def _smooth(values: Complex, width: int) -> Complex:
+    """Means over so many samples around each."""
+    return np.asarray(np.convolve(values, np.ones(width) / width, mode="same"))
 
 
 def _means(values: Complex, width: int) -> Numbers:

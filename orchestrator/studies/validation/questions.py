@@ -49,6 +49,8 @@ class QuestionKind(StrEnum):
     SETPOINT = "setpoint"
     OUT_OF_STEP = "out of step"
     OTHER_EVENT = "another event"
+    SECOND_EVENT = "second event"
+    SLIP = "slips"
     OVER_LIMIT = "above a limit"
     TOO_GOOD = "too good"
     NO_NOISE = "no noise"
@@ -65,6 +67,8 @@ FIGURES_HOLD = {
     QuestionKind.NOISE,
     QuestionKind.NO_NOISE,
     QuestionKind.SHORT_BEFORE,
+    QuestionKind.SECOND_EVENT,
+    QuestionKind.SLIP,
     QuestionKind.OVER_LIMIT,
     QuestionKind.FRAMES,
 }

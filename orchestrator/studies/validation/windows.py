@@ -51,7 +51,7 @@ class Windows:
     """Begin and end of an event, in seconds from the first sample; ``chosen``: whether the user gave them.
 
     ``first_end``: when its first change has ended, which a second, slower one may follow within the window; None if the
-    window's end is meant."""
+    window's end is meant. ``second``: when another event begins, with which the window after this one ends."""
 
     begin: float
     end: float
@@ -59,13 +59,19 @@ class Windows:
     first_end: float | None = None
     chosen: bool = False
     seen: bool = True  # whether the voltage shows an event
+    second: float | None = None
+
+    @property
+    def until(self) -> float:
+        """The time up to which what is seen is of this event [s]."""
+        return self.length if self.second is None else self.second
 
     @property
     def parts(self) -> dict[str, tuple[float, float]]:
         return {
             "before": (0.0, self.begin),
             "during": (self.begin, self.end),
-            "after": (self.end, self.length),
+            "after": (self.end, self.until),
         }
 
     def part(self, name: str, times: Numbers) -> Mask:
@@ -73,7 +79,8 @@ class Windows:
 
         The first one may hold a part of the event already, as where a recorder takes its sample in the transition."""
         early, late = times < self.begin - _SAME, times > self.end + _SAME
-        inside = {"before": early, "during": ~(early | late), "after": late}
+        own = times < self.until - _SAME if self.second is not None else True
+        inside = {"before": early, "during": ~(early | late), "after": late & own}
         return np.asarray(inside[name])
 
 

@@ -146,6 +146,28 @@ def _out_of_step(x: Figures) -> str:
     )
 
 
+def _slip(x: Figures) -> str:
+    return (
+        f"from {x['at']:.4g} s on the model falls out of step: its current turns past the opposite of the plant's. "
+        "What comes after tells no value: "
+        + Option.EXPLAIN
+        + " looks at the part before; give it to "
+        + Option.FIT
+        + " as well, with "
+        + Option.STOP
+        + f" {x['at']:.4g}"
+    )
+
+
+def _second_event(x: Figures) -> str:
+    return (
+        f"at about {x['at']:.4g} s a second event begins, after that at {x['first']:.4g} s: errors, ring-down and "
+        "step are those before it. Give what comes later as a recording of its own, with "
+        + Option.START
+        + " in the quiet before it"
+    )
+
+
 def _over_limit(x: Figures) -> str:
     return (
         f"from {x['at']:.4g} s on the model's current is above its limit for {x['length']:.3g} s in all, up to "
@@ -210,6 +232,8 @@ _SENTENCES: Mapping[QuestionKind, Sentence] = {
     QuestionKind.METER_ELSEWHERE: _meter_elsewhere,
     QuestionKind.SETPOINT: _setpoint,
     QuestionKind.OUT_OF_STEP: _out_of_step,
+    QuestionKind.SECOND_EVENT: _second_event,
+    QuestionKind.SLIP: _slip,
     QuestionKind.OVER_LIMIT: _over_limit,
     QuestionKind.OTHER_EVENT: _other_event,
     QuestionKind.TOO_GOOD: _too_good,

@@ -6,6 +6,10 @@ import pytest
 
 import orchestrator as gfor_in_python
 from orchestrator.studies.validation.hypotheses import _is_whole
+from orchestrator.studies.validation.limits import EXAMPLE
+from orchestrator.studies.validation.out_of_step import slip
+from orchestrator.studies.validation.record import Recording
+from orchestrator.studies.validation.windows import Windows
 from tests.studies.validation.recordings import table, with_noise
 
 STEP = "200 us"
@@ -79,3 +83,82 @@ def test_a_model_without_the_plants_limit_makes_no_minutes_of_seconds():
 def test_a_recorder_takes_a_whole_number_of_samples_a_second(rate, whole):
     """50.05 a second: times in minutes with six decimals, 20 ms apart."""
     assert _is_whole(rate) is whole
+
+
+def made(frame, values=PLANT):
+    """P and Q of a device at a voltage, as of an instrument."""
+    found = gfor_in_python.validate(
+        "gfor", frame.set_index("time"), values=values, step=STEP, average=0
+    )
+    curves = found.curves()
+    return with_noise(
+        frame.assign(
+            p_mw=1500 * curves.p_simulated.to_numpy(), q_mvar=1500 * curves.q_simulated.to_numpy()
+        )
+    )
+
+
+def stiff(degrees, megawatt):
+    """A stiff grid whose angle jumps: a plant without a limit of its speed may not follow."""
+    angle = degrees * (TIMES >= 1)
+    empty = {"v_pu": 1.0, "angle_deg": angle + 0.0, "p_mw": megawatt, "q_mvar": 0.0}
+    return pd.DataFrame({"time": TIMES} | empty)
+
+
+NO_RESISTANCE = {"current_limit.kind": 3}
+"""A limit of another kind, beside which the model turns away from the plant."""
+
+
+@pytest.mark.parametrize(("degrees", "megawatt"), [(-40, 1350.0), (-60, 750.0)])
+def test_a_model_that_turns_past_its_plant_is_told_though_it_is_off_by_little(degrees, megawatt):
+    """Its current turns by half a turn and more, and no mean power stays far off up to the end."""
+    recorded = made(stiff(degrees, megawatt))
+    found = validated(recorded, PLANT | NO_RESISTANCE, limits=EXAMPLE)
+    (asked,) = [one for one in found.as_json()["events"][0]["questions"] if one["kind"] == "slips"]
+    assert asked["keeps_open"] is False
+    assert 1.0 < asked["figures"]["at"] < 1.5
+    assert "out of step" not in kinds(found)
+    assert found.verdict == "not met"
+    assert "slips" not in kinds(validated(recorded, PLANT))
+
+
+def slipped(angle, seen=0.5, own=0.5):
+    """The moment of a slip; currents [pu], and the angle between them from 1 s on [turns]."""
+    size = np.where(TIMES < 1, seen, own)
+    everywhere = np.ones(len(TIMES), dtype=bool)
+    recording = Recording(
+        label="rec",
+        begin=0.0,
+        interval=1e-3,
+        voltage=everywhere.astype(complex),
+        power=np.full(len(TIMES), seen + 0j),
+        good=everywhere,
+        driven=everywhere,
+        frame_hz=50.0,
+        instantaneous=False,
+        average=0.02,
+        channels={},
+    )
+    windows = Windows(begin=1.0, end=1.1, length=float(TIMES[-1]))
+    return slip(recording, windows, size * np.exp(2j * np.pi * angle))
+
+
+def test_a_slip_begins_where_the_model_leaves_the_plant():
+    moment = slipped(np.clip(TIMES - 2, 0, None))  # a quarter of a turn at 2.25 s
+    assert moment == pytest.approx(2.25, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    "angle",
+    [
+        0.45 * np.sin(2 * np.pi * np.clip(TIMES - 1, 0, None)),  # back and forth
+        0.5 * np.ones(len(TIMES)),  # a wrong sign from the begin on
+        0.5 * np.clip((TIMES - 1) / 0.2, 0, 1),  # feeds the other way
+    ],
+)
+def test_a_model_that_swings_or_has_another_sign_does_not_slip(angle):
+    assert slipped(angle) is None
+
+
+def test_the_angle_of_no_current_tells_no_slip():
+    assert slipped(np.clip(TIMES - 2, 0, None), own=0.05) is None
