@@ -9,5 +9,8 @@ DYR_RECORDS = records_beside(__file__)
 every machine, from the network data (ZSORCE) as ``machine.X_d1`` and ``machine.R_s``; machine data are on ``S_n``
 unless ``machine.S_data`` [MVA] says otherwise, as MBASE does."""
 
+WITHOUT_REFERENCE = ("degov",)
+"""Governors without a power reference, which no record of a supervisor can move."""
+
 MACHINE_VARIANTS = {"genrou_rated_speed": "genrou"}
 """Machines that have the fields of another one's record, and differ in an assumption."""

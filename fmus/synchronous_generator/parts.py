@@ -56,6 +56,7 @@ from fmus.synchronous_generator.turbines.governors import (
     read_either_way,
     tgov1,
 )
+from fmus.synchronous_generator.turbines.load_control import with_load_control
 from fmus.synchronous_generator.turbines.steam import ieeeg1, ieesgo, tgov3, wsieg1
 from fmus.synchronous_generator.turbines.water import hygov2, ieeeg2, ieeeg3
 from fmus.synchronous_generator.turbines.water_pid import pidgov, wpidhy, wshygp
@@ -169,7 +170,12 @@ UELS: dict[str, Limiter | None] = {
 WITH_POD = {"_pod": False, "_pod_input": True}
 """Ends of a governor's name that give it a POD-P, and whether that acts on a frequency at an input."""
 
-WITHOUT_REFERENCE = ("degov",)  # governors without a power reference, so without a POD-P
+WITH_LOAD_CONTROL = "_lcfb1"
+"""End of a governor's name that gives it a load controller LCFB1; one of `WITH_POD` may follow."""
+
+WITHOUT_REFERENCE = (
+    "degov",
+)  # governors without a power reference, so without a POD-P and a load controller
 
 
 @dataclass(frozen=True)
@@ -232,18 +238,23 @@ def chosen_parts(
 
 
 def _governor(name: str) -> Governor:
-    """The governor of a name, with a POD-P where the name ends so."""
+    """The governor of a name, with a load controller and a POD-P where the name ends so."""
     end = next((end for end in WITH_POD if name.endswith(end)), "")
-    plain = name.removesuffix(end)
-    if not end or plain not in GOVERNORS:
+    controlled = name.removesuffix(end)
+    plain = controlled.removesuffix(WITH_LOAD_CONTROL)
+    if plain == name or plain not in GOVERNORS:
         found: Governor = _part("governor", GOVERNORS, name)
         return found
     if plain in WITHOUT_REFERENCE:
+        what = "a POD" if end else "a load controller"
         raise ValueError(
-            f"governor = {name!r}: {plain} has no power reference that a POD could move; take another governor, such "
-            f"as {plain}1{end}"
+            f"governor = {name!r}: {plain} has no power reference that {what} could move; take another governor, such "
+            f"as {name.replace(plain, f'{plain}1', 1)}"
         )
-    return with_pod(GOVERNORS[plain], far=WITH_POD[end])
+    found = GOVERNORS[plain]
+    if controlled != plain:
+        found = with_load_control(found)
+    return with_pod(found, far=WITH_POD[end]) if end else found
 
 
 def _part(kind: str, parts: Mapping[str, Any], name: str) -> Any:

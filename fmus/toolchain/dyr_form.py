@@ -47,7 +47,8 @@ class DyrRecord:
     """One kind of record.
 
     ``kind``: key of the component's table: ``machine``, ``exciter``, ``governor``, ``stabilizer``, ``oel`` or ``uel``;
-    ``compensator`` for what an exciter measures, which is no part of its own; ``converter`` for a record that is a
+    ``compensator`` for what an exciter measures, which is no part of its own; ``supervisor`` for a slow loop around a
+    governor, whose part is the end of the governor's name; ``converter`` for a record that is a
     whole component, to which ``electrical`` and ``plant`` may belong as its control and its plant's, ``shaft``,
     ``aerodynamics``, ``pitch`` and ``torque`` as its wind turbine's; ``plants`` for a controller of several units, a
     component of its own; ``load`` for one that is a load's; ``dc line`` for one of a DC line;
@@ -81,6 +82,7 @@ _SCOPES = {
     "machine": "machine.",
     "exciter": "exciter.",
     "governor": "governor.",
+    "supervisor": "governor.lcfb1.",
     "stabilizer": "pss.",
     "compensator": "exciter.",
     "oel": "oel.",

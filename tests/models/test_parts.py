@@ -21,6 +21,8 @@ def with_part(kind, name):
     """A generator with a part, beside others that it fits; what a compensator sets, the exciter has."""
     if kind == "compensator":
         return synchronous_generator(exciter="st1a")
+    if kind == "supervisor":
+        return synchronous_generator(governor=f"tgov1_{name}")
     return synchronous_generator(
         **({"exciter": "st1a"} if kind in ("stabilizer", "oel", "uel") else {}) | {kind: name}
     )
@@ -151,6 +153,7 @@ def test_every_field_of_a_dyr_record_sets_a_parameter_of_its_part(name):
         ("WEHGOV", 50),
         ("COMP", 1),
         ("IEEEVC", 2),
+        ("LCFB1", 9),
         ("OEL2C", 43),
         ("OEL2CU1", 49),
         ("OEL3C", 12),

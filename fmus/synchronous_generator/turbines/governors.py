@@ -46,6 +46,7 @@ LONGEST_DELAY = 0.25
 
 
 POWER_REFERENCE = "power reference"  # name of a signal that adds to it, in a model's hand-over
+LOAD_CONTROL = "load control"  # the same of a slow loop around the governor
 
 power = partial(per_unit, base="S_n", source=SOURCE)
 time = partial(time_constant, source=SOURCE)
@@ -54,15 +55,15 @@ time = partial(time_constant, source=SOURCE)
 def power_reference(m: ModelBuilder, P_ref_0: Scalar) -> Expr:
     """Declare the power reference of the operating point and its change; return their sum [pu, S_n].
 
-    What another part, a POD, has handed over adds to it."""
+    What other parts, a POD and a load controller, have handed over adds to it."""
     P_ref = m.calculated(
         "P_ref", P_ref_0, "pu", "Power reference of the operating point", base="S_n"
     )
     reference = P_ref + m.parameter(
         "delta_P_ref", 0.0, "pu", "Change of the power reference", base="S_n", tunable=True
     )
-    signal = m.handed_over(POWER_REFERENCE)
-    return reference if signal is None else reference + signal
+    handed = (m.handed_over(name) for name in (POWER_REFERENCE, LOAD_CONTROL))
+    return sum((signal for signal in handed if signal is not None), start=reference)
 
 
 def read_either_way(governor: Governor) -> Governor:

@@ -68,6 +68,7 @@ def machine_models(
     for record in records:
         found.take(record)
     place_limiters([] if found.problems else records, left, found.parts, found.values)
+    found.give_load_controllers()
     found.give_infinite_machines()
     static = _static_machines(found, replaced) if WITHOUT_RECORD in leaving_out else {}
     measured = measured_points(found.records, found.parts, found.problems)

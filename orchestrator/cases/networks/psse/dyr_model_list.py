@@ -33,6 +33,10 @@ _COMPENSATORS = "PowerWorld's guide to PSS/E's models; CSVGN5 and SVSMO1 as Inte
 _OF_LIMITERS = (
     "IEC 61970-302, STEPSS' page of RAMSES' exciters, Dynawo, OpenIPSL; PowerWorld's help (OEL3C)"
 )
+_SOURCES = {
+    "supervisor": "STEPS' reader and model of LCFB1, IEC 61970-302, PowerWorld's help on LCFB1_PTI"
+}
+"""Sources of the records of machines that are of a kind of their own."""
 _REGFM = "WECC's specification of REGFM_A1"
 _REGFM_B1 = "WECC's specification of REGFM_B1, in PNNL's script for PSS/E"
 _LOADS = "GridPACK's reader and model"
@@ -116,7 +120,7 @@ def _of_names(
 def _of_machines() -> Iterator[KnownRecord]:
     for name, record in DYR_RECORDS.items():
         kind = _KINDS.get(record.kind, record.kind)
-        source = _OF_LIMITERS if record.kind in LIMITERS else _LIBRARY
+        source = _OF_LIMITERS if record.kind in LIMITERS else _SOURCES.get(record.kind, _LIBRARY)
         yield KnownRecord(name, kind, record.part, source, _limits(record))
 
 
@@ -162,6 +166,7 @@ def _peers() -> dict[str, str]:
 _KINDS = {
     "oel": "limiter of overexcitation",
     "uel": "limiter of underexcitation",
+    "supervisor": "supervisor of a governor",
     "converter": "converter",
     "electrical": "converter control",
     "plant": "plant control",

@@ -3,6 +3,7 @@
 from collections.abc import Collection, Sequence
 
 from fmus.grid_following.dyr_approximation import FIELDS
+from fmus.synchronous_generator.dyr_records import WITHOUT_REFERENCE
 from fmus.toolchain.dyr_form import DyrRecord
 from orchestrator.cases.form.remedies import without_models
 from orchestrator.cases.networks.psse.dyr_file import (
@@ -132,6 +133,24 @@ class PartsOfMachines:
             if machine.is_infinite and not self.records[key]:
                 self.parts[key]["machine"] = CLASSICAL
                 self.values[key] |= WITHOUT_INERTIA
+
+    def give_load_controllers(self) -> None:
+        """Give governors the slow loops around them that records say; one without a governor to move is a problem."""
+        for key, parts in self.parts.items():
+            end = parts.pop("supervisor", None)
+            if end is None:
+                continue
+            governor = parts.get("governor", "")
+            if governor and governor not in WITHOUT_REFERENCE:
+                parts["governor"] = f"{governor}_{end}"
+                continue
+            name = self.names[key]["supervisor"]
+            record = next(one for one in self.records[key] if one.name == name)
+            whose = f"{self.names[key]['governor']} has none" if governor else "it has no governor"
+            self.problems.append(
+                f"{record.place}: {name} moves the power reference of the governor of machine {record.machine!r} at "
+                f"bus {record.bus}, and {whose}; write {without_models([name])}"
+            )
 
     def is_open(self, key: MachineKey) -> bool:
         """Return whether a record of a machine is left out."""

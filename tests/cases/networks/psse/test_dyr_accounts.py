@@ -72,20 +72,20 @@ def test_a_file_that_changes_is_read_anew(tmp_path):
 
 def test_models_that_are_missing_are_one_table(tmp_path):
     many = "".join(f"{bus} 'URST5T' 1 0.1 /\n" for bus in (1, 2, 3))
-    many += "2 'LCFB1' 1 3 /\n3 'OWNGOV' 1 3 /\n"
+    many += "2 'VAR2' 1 3 /\n3 'OWNGOV' 1 3 /\n"
     text = refusal(tmp_path, CLASSICAL + many)
     rows = [
-        line.split() for line in text.splitlines() if line.split()[:1] in (["URST5T"], ["LCFB1"])
+        line.split() for line in text.splitlines() if line.split()[:1] in (["URST5T"], ["VAR2"])
     ]
     assert [row[:5] for row in rows] == [
         ["URST5T", "3", "600", "line", "4"],
-        ["LCFB1", "1", "200", "line", "7"],
+        ["VAR2", "1", "200", "line", "7"],
     ]
     assert "much: the voltage control" in text
     assert "little: it is slower than these modes" in text
     assert "constant references" in text
     assert "not known: gfor does not know what this model is" in text
-    typed = "--dyr-leave-out URST5T --dyr-leave-out OWNGOV --dyr-leave-out LCFB1"
+    typed = "--dyr-leave-out URST5T --dyr-leave-out OWNGOV --dyr-leave-out VAR2"
     assert (
         text.splitlines()[-1].strip().startswith("to go on without them, write dyr_leave_out = [")
     )
@@ -151,10 +151,10 @@ def test_records_of_no_machine_are_listed_and_asked_about(tmp_path):
     text = (
         CLASSICAL
         + IEELAL
-        + "9 'CMLDBLU2' 1 5 /\n9 'DISTR1' 1 5 /\n2 'LCFB1' 1 3 /\n8 'GENCLS' 1 4 0 /\n"
+        + "9 'CMLDBLU2' 1 5 /\n9 'DISTR1' 1 5 /\n2 'VAR2' 1 3 /\n8 'GENCLS' 1 4 0 /\n"
     )
     records = read(tmp_path, text)
-    uses = record_uses(records, {(bus, "1") for bus in (1, 2, 3)}, {(8, "1")}, ["lcfb1"])
+    uses = record_uses(records, {(bus, "1") for bus in (1, 2, 3)}, {(8, "1")}, ["var2"])
     assert [use.use for use in uses] == [UseOfRecord.USED] * 3 + [UseOfRecord.NOT_USED] * 5
     assert [use.why for use in uses[5:]] == [
         "a relay at bus 9, which is of no machine",
