@@ -32,7 +32,7 @@ def alone(values):
 
 
 def added(values, end, inputs, x=None):
-    """What the loop adds to the reference at every step, and the states at the end."""
+    """Return what the loop adds to the reference at every step, and the states at the end."""
     found, x = integrated(alone(values), inputs, end, STEP, x)
     return np.array([row["P_m"] for row in found]) - P_M, x
 
