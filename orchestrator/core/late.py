@@ -24,6 +24,10 @@ class Late:
         self._module = module
 
     def __getattr__(self, name: str) -> Any:
+        if (
+            name == "__wrapped__"
+        ):  # for which `inspect`, and doctest by it, ask every name of a module
+            raise AttributeError(name)
         return getattr(import_module(self._module), name)
 
 

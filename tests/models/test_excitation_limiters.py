@@ -2,14 +2,15 @@
 
 import numpy as np
 import pytest
-import scipy.signal
 
 from fmus.synchronous_generator.composed import synchronous_generator, synchronous_generator_phasor
 from fmus.synchronous_generator.parts import EXCITERS, OELS, UELS
 from tests.models.one_machine import OneMachine, three_buses
 from tests.models.parts import AT_BUS, BUS, CURRENT, E_FD, V_T, integrated, limiter, refused
 from tests.support.evaluated import Evaluated
+from tests.support.late import LateLibrary
 
+scipy_signal = LateLibrary("scipy.signal")
 POINTS = {"EFDRATED": 2.0, "EFD1": 1.2, "TIME1": 3.0, "EFD2": 1.5, "TIME2": 1.0, "EFD3": 2.0}
 TIMED = POINTS | {"TIME3": 0.5, "EFDDES": 1.0, "KMX": 0.1, "VLOW": -0.2}
 """At rest u = 1.1, below EFD1 = 1.2."""
@@ -363,7 +364,7 @@ def test_uel2_follows_a_step_as_its_blocks_do():
     zeros = [np.array([times[name], 1.0]) for name in ("T_U1", "T_U3")]
     numerator, denominator = 0.8 * 0.19 * np.polymul(*zeros), np.polymul(*poles[:2])
     t = np.arange(len(found) + 1) * 1e-3
-    _, wanted = scipy.signal.step((numerator, np.polymul(denominator, poles[2])), T=t)
+    _, wanted = scipy_signal.step((numerator, np.polymul(denominator, poles[2])), T=t)
     got = np.array([each["v_s"] for each in found])
     assert got == pytest.approx(wanted[1:], abs=1e-6)
     capped = limiter(

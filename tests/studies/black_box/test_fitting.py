@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 import scipy.linalg
-import scipy.signal
 
 from orchestrator.core.errors import AnalysisError
 from orchestrator.studies.black_box import fitting
 from orchestrator.studies.black_box.fitting import fit, passivity
 from orchestrator.studies.black_box.frequency_response import FrequencyResponse
+from tests.support.late import LateLibrary
 
+scipy_signal = LateLibrary("scipy.signal")
 H = 1e-4
 FREQUENCIES = 0.05 * (2 * np.unique(np.round((np.geomspace(1, 19999, 120) - 1) / 2)) + 1)
 
@@ -17,7 +18,7 @@ FREQUENCIES = 0.05 * (2 * np.unique(np.round((np.geomspace(1, 19999, 120) - 1) /
 def response(A, B, C, D=None, bound=1e-9):
     """Measured response of a continuous system with its inputs held over each step."""
     D = np.zeros((len(C), B.shape[1])) if D is None else D
-    Ad, Bd, *_ = scipy.signal.cont2discrete((A, B, C, D), H, method="zoh")
+    Ad, Bd, *_ = scipy_signal.cont2discrete((A, B, C, D), H, method="zoh")
     z = np.exp(2j * np.pi * FREQUENCIES * H)
     values = np.array([C @ np.linalg.solve(x * np.eye(len(A)) - Ad, Bd) + D / x for x in z])
     names = tuple(f"u{k}" for k in range(B.shape[1])), tuple(f"y{k}" for k in range(len(C)))

@@ -5,7 +5,6 @@ from functools import partial
 
 import numpy as np
 import pytest
-import scipy.signal
 
 from orchestrator.core.errors import InputError
 from orchestrator.studies.oscillations.detection import Signals, find_oscillations
@@ -13,7 +12,9 @@ from orchestrator.studies.oscillations.location import DEF, QV_PHASE
 from orchestrator.studies.oscillations.measurements import Site, made_ready
 from orchestrator.studies.oscillations.verdict import locate
 from tests.support.forced_records import load_noise, model, record, sine, times_of, unit_models_of
+from tests.support.late import LateLibrary
 
+scipy_signal = LateLibrary("scipy.signal")
 TIMES = times_of(50.0)
 
 
@@ -52,7 +53,7 @@ def test_the_begin_of_a_forcing_beside_a_mode_lies_in_its_interval():
     `tests/benchmarks/begins.py` measures how often the interval holds the begin."""
     times, size = times_of(60.0), 2 * np.pi * 0.961
     mode = ([size**2], [1.0, 2 * 0.029 * size, size**2])
-    _, swing, _ = scipy.signal.lsim(mode, sine(times, 0.95, 1.0, 5.0), times)
+    _, swing, _ = scipy_signal.lsim(mode, sine(times, 0.95, 1.0, 5.0), times)
     for seed in range(4):
         noise = load_noise(len(times), 1, 30.0, 0.2, seed)
         (line,) = find_oscillations(Signals(times, ("unit.p",), swing[:, None] + noise))

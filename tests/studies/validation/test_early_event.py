@@ -3,11 +3,12 @@
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.signal import lfilter
 
 from orchestrator.studies.validation.record import PortBases, read_recording
 from orchestrator.studies.validation.windows import find_windows
+from tests.support.late import LateLibrary
 
+scipy_signal = LateLibrary("scipy.signal")
 LENGTH = 6.0  # [s]
 
 
@@ -133,7 +134,7 @@ def wandering(times, seed, hertz=0.005, corner=0.2):
     interval = times[1] - times[0]
     kept = np.exp(-2 * np.pi * corner * interval)
     pushes = hertz * np.sqrt(1 - kept**2) * np.random.default_rng(seed).standard_normal(len(times))
-    frequency = lfilter([1.0], [1.0, -kept], pushes)
+    frequency = scipy_signal.lfilter([1.0], [1.0, -kept], pushes)
     return 2 * np.pi * np.cumsum(frequency) * interval
 
 

@@ -5,7 +5,6 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.signal import lfilter
 
 import orchestrator as gfor_in_python
 from orchestrator.output.results.readers import LINE_FREQUENCY
@@ -15,7 +14,9 @@ from orchestrator.studies.validation.questions import QuestionKind
 from orchestrator.studies.validation.record import PortBases, read_recording
 from orchestrator.studies.validation.words import sentence
 from tests.studies.validation.recordings import of_pmu, run, table, waves, with_noise
+from tests.support.late import LateLibrary
 
+scipy_signal = LateLibrary("scipy.signal")
 ON = {"pod_p.enabled": True}
 STEP = "500 us"
 """Of the device, so that less time goes; a good recording is tried in steps of a coupled run as well."""
@@ -54,7 +55,7 @@ def of_filtered_frequency(frame, seconds=0.1):
     """The angle as the integral of a frequency behind a first-order lag."""
     turns = 2 * np.pi * np.diff(frame.angle_deg / 360, prepend=frame.angle_deg[0] / 360) / 1e-3
     part = 1e-3 / seconds
-    filtered = lfilter([part], [1, part - 1], turns)
+    filtered = scipy_signal.lfilter([part], [1, part - 1], turns)
     return frame.assign(angle_deg=np.rad2deg(np.cumsum(filtered) * 1e-3))
 
 
@@ -95,7 +96,7 @@ def beyond_transformer(frame, reactance=0.12):
 def of_angle_behind_a_lag(frame, seconds=0.02):
     part = 1e-3 / seconds
     first = frame.angle_deg[0]
-    behind = lfilter([part], [1, part - 1], frame.angle_deg - first) + first
+    behind = scipy_signal.lfilter([part], [1, part - 1], frame.angle_deg - first) + first
     return frame.assign(angle_deg=behind)
 
 
@@ -103,7 +104,9 @@ def lagged(frame, column, seconds):
     """One column behind a first-order lag, as of a transducer."""
     part = 1e-3 / seconds
     first = frame[column][0]
-    return frame.assign(**{column: lfilter([part], [1, part - 1], frame[column] - first) + first})
+    return frame.assign(
+        **{column: scipy_signal.lfilter([part], [1, part - 1], frame[column] - first) + first}
+    )
 
 
 def with_angle_jump(frame, degrees, at=3.0):

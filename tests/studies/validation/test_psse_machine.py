@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.signal import lfilter
 
 import orchestrator as gfor_in_python
+from tests.support.late import LateLibrary
 
+scipy_signal = LateLibrary("scipy.signal")
 FLOW = Path(__file__).parents[2] / "reference" / "psse_sexs_flow.csv"
 LINE = 0.01 + 0.12j  # each of the three [pu on 100 MVA]
 LOAD, LOADED_AT = (
@@ -104,7 +105,9 @@ def test_pss_es_machine_comes_back_by_its_own_terminal_voltage(case, recording):
 def behind_a_lag(frame, column, seconds=0.05):
     part = 1 - np.exp(-0.005 / seconds)
     first = frame[column].iloc[0]
-    return frame.assign(**{column: lfilter([part], [1, part - 1], frame[column] - first) + first})
+    return frame.assign(
+        **{column: scipy_signal.lfilter([part], [1, part - 1], frame[column] - first) + first}
+    )
 
 
 def test_the_parameters_of_pss_es_machine_are_found_again(case, recording):

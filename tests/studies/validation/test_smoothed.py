@@ -3,7 +3,6 @@
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.signal import butter, filtfilt
 
 import orchestrator as gfor_in_python
 from orchestrator.studies.validation.questions import QuestionKind
@@ -11,7 +10,9 @@ from orchestrator.studies.validation.record import PortBases, read_recording
 from orchestrator.studies.validation.smoothed import ask_of_smoothing
 from orchestrator.studies.validation.windows import find_windows
 from tests.studies.validation.test_early_event import SLOW, dip
+from tests.support.late import LateLibrary
 
+scipy_signal = LateLibrary("scipy.signal")
 BEGIN = 3.0  # of the event [s]
 TIMES = np.arange(0.0, 10.0, 1e-3)
 
@@ -38,8 +39,8 @@ def step_and_swing(size=0.02, swing=0.1, hertz=0.6):
 
 def low_passed(frame, hertz=2.0):
     """All columns behind a low-pass filter of second order without phase lag."""
-    filters = butter(2, hertz, fs=1e3)
-    return frame.apply(lambda column: filtfilt(*filters, column), raw=True)
+    filters = scipy_signal.butter(2, hertz, fs=1e3)
+    return frame.apply(lambda column: scipy_signal.filtfilt(*filters, column), raw=True)
 
 
 def means(frame, every):

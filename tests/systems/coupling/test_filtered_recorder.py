@@ -4,11 +4,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.signal import firwin
 
 from orchestrator.systems.coupling import recorder as module
 from orchestrator.systems.coupling.filtered_recorder import FilteredRecorder
+from tests.support.late import LateLibrary
 
+scipy_signal = LateLibrary("scipy.signal")
 STEP = 1e-3
 
 
@@ -48,7 +49,7 @@ def test_rows_are_the_convolution_with_the_ends_held(system):
     recorder = FilteredRecorder(["a.y", "a.z"], 20)
     record(run, recorder, 1236)
     recorder.end(run)
-    weights = firwin(1001, 0.9 / 20, window=("kaiser", 7.857))
+    weights = scipy_signal.firwin(1001, 0.9 / 20, window=("kaiser", 7.857))
     padded = np.concatenate(
         [np.repeat(inputs[:1], 500, axis=0), inputs, np.repeat(inputs[-1:], 500, axis=0)]
     )
