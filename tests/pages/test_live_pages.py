@@ -29,6 +29,32 @@ def saved(path):
     return json.loads(content)
 
 
+@pytest.fixture(scope="module")
+def browser():
+    """One for all tests of these pages: its start takes longer than most of them."""
+    if CHROMIUM is None:
+        pytest.skip("needs chromium (Debian: apt-get install chromium)")
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as tools:
+        found = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        yield found
+        found.close()
+
+
+@pytest.fixture
+def window(browser):
+    """Opens windows that know nothing of each other; they are closed after the test."""
+    views = []
+
+    def opened(**size):
+        views.append(browser.new_page(**size))
+        return views[-1]
+
+    yield opened
+    for view in views:
+        view.close()
+
+
 def test_the_guide_leads_to_every_page_and_says_how_it_was_made():
     led = {(GUIDE.parent / target).resolve() for _, target in links(GUIDE)}
     assert len(PAGES) >= 5
@@ -93,71 +119,56 @@ def test_the_figures_are_those_of_today(name):
         )
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
-def test_every_question_of_a_page_is_asked_by_tab_and_enter():
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as tools:
-        browser = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
-        view = browser.new_page(viewport={"width": 1280, "height": 900})
-        view.goto((ROOT / ".docs" / "live" / "two_area.html").as_uri())
-        view.get_by_role("button", name="What is a mode?").wait_for()
-        asked = set()
-        for _ in range(MOST_STOPS):
-            view.keyboard.press("Tab")
-            question = view.evaluate("document.activeElement.textContent").strip()
-            if question.endswith("?") and question not in asked:
-                before = view.inner_text("body")
-                view.keyboard.press("Enter")
-                view.wait_for_function("seen => document.body.innerText !== seen", arg=before)
-                asked.add(question)
-        answer = view.inner_text("body")
-        browser.close()
+def test_every_question_of_a_page_is_asked_by_tab_and_enter(window):
+    view = window(viewport={"width": 1280, "height": 900})
+    view.goto((ROOT / ".docs" / "live" / "two_area.html").as_uri())
+    view.get_by_role("button", name="What is a mode?").wait_for()
+    asked = set()
+    for _ in range(MOST_STOPS):
+        view.keyboard.press("Tab")
+        question = view.evaluate("document.activeElement.textContent").strip()
+        if question.endswith("?") and question not in asked:
+            before = view.inner_text("body")
+            view.keyboard.press("Enter")
+            view.wait_for_function("seen => document.body.innerText !== seen", arg=before)
+            asked.add(question)
+    answer = view.inner_text("body")
     assert "What is a mode?" in asked
     assert len(asked) >= 3
     assert "A mode is one of the ways in which the system swings" in answer
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
-def test_a_doubled_gain_is_a_question_and_words_have_the_pages_size_on_a_phone():
-    playwright = pytest.importorskip("playwright.sync_api")
+def test_a_doubled_gain_is_a_question_and_words_have_the_pages_size_on_a_phone(window):
     path = ROOT / ".docs" / "live" / "two_area.html"
     held = {tuple(one["values"].items()): one["answer"] for one in saved(path)["answers"]}
     answer = held[("grid.X_L", 0.1), ("gfor.pod_p.K", 400.0)]["modes"]["scenarios"][0]
     least = min(mode["damping_percent"] for mode in answer["modes"])
-    with playwright.sync_playwright() as tools:
-        browser = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
-        view = browser.new_page(viewport={"width": 390, "height": 844})
-        view.goto(path.as_uri())
-        view.get_by_role("button", name="What if gfor.pod_p.K is doubled?").click()
-        said = view.inner_text("#else-said")
-        heights = view.evaluate(
-            "[...document.querySelectorAll('#first-plot svg text')].map(x => x.getBoundingClientRect().height)"
-        )
-        browser.close()
+    view = window(viewport={"width": 390, "height": 844})
+    view.goto(path.as_uri())
+    view.get_by_role("button", name="What if gfor.pod_p.K is doubled?").click()
+    said = view.inner_text("#else-said")
+    heights = view.evaluate(
+        "[...document.querySelectorAll('#first-plot svg text')].map(x => x.getBoundingClientRect().height)"
+    )
     assert "With gfor.pod_p.K = 400: stable, least damped " in said
     assert f"with {least:.2f} %" in said
     assert heights
     assert min(heights) > 9  # [px]; they were 5
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
-def test_a_question_names_the_few_values_at_which_it_is_stable():
+def test_a_question_names_the_few_values_at_which_it_is_stable(window):
     """Twelve values were named at which Kundur's system is unstable, for one at which it is stable."""
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as tools:
-        browser = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
-        view = browser.new_page(viewport={"width": 1280, "height": 900})
-        view.goto((ROOT / ".docs" / "live" / "kundur.html").as_uri())
-        said = {}
-        for name in ("grid.load_7.scale", "grid.load_9.scale", "grid.X_tie_8_9_2"):
-            view.get_by_role("button", name=f"Which {name} damps most?").click()
-            said[name] = view.inner_text("#else-said").partition("%. ")[2].partition(" show it")[0]
-        view.evaluate(
-            "dragSaved('grid.load_9.scale', 0.9 * SAVED.grid['grid.load_9.scale'].find(x => x > 0.5))"
-        )
-        beside = view.inner_text("#outside")
-        others = view.inner_text("#between")
-        browser.close()
+    view = window(viewport={"width": 1280, "height": 900})
+    view.goto((ROOT / ".docs" / "live" / "kundur.html").as_uri())
+    said = {}
+    for name in ("grid.load_7.scale", "grid.load_9.scale", "grid.X_tie_8_9_2"):
+        view.get_by_role("button", name=f"Which {name} damps most?").click()
+        said[name] = view.inner_text("#else-said").partition("%. ")[2].partition(" show it")[0]
+    view.evaluate(
+        "dragSaved('grid.load_9.scale', 0.9 * SAVED.grid['grid.load_9.scale'].find(x => x > 0.5))"
+    )
+    beside = view.inner_text("#outside")
+    others = view.inner_text("#between")
     assert "holds pod_q; gfor explore kundur opens the others of the case: manual," in others
     assert said == {
         "grid.load_7.scale": "Unstable at all of them.",
@@ -167,26 +178,21 @@ def test_a_question_names_the_few_values_at_which_it_is_stable():
     assert beside.startswith("Computed nearby, with grid.load_9.scale = 0.5848: stable")
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
-def test_a_typed_value_that_was_not_computed_is_told_with_the_one_that_is_shown():
+def test_a_typed_value_that_was_not_computed_is_told_with_the_one_that_is_shown(window):
     """400 once became 447.2, and −5 the least of the grid, without a word."""
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as tools:
-        browser = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
-        view = browser.new_page(viewport={"width": 1280, "height": 900})
-        view.goto((ROOT / ".docs" / "live" / "two_area.html").as_uri())
-        control = view.locator('.control[data-name="gfor.pod_p.K"]')
-        said = {}
-        for typed in ("31", "2000", "−5", "27"):
-            control.get_by_role("textbox").fill(typed)
-            control.get_by_role("textbox").press("Enter")
-            view.wait_for_timeout(100)
-            told = control.locator(".snapped")
-            said[typed] = (
-                told.inner_text() if told.count() else "",
-                control.get_by_role("textbox").input_value(),
-            )
-        browser.close()
+    view = window(viewport={"width": 1280, "height": 900})
+    view.goto((ROOT / ".docs" / "live" / "two_area.html").as_uri())
+    control = view.locator('.control[data-name="gfor.pod_p.K"]')
+    said = {}
+    for typed in ("31", "2000", "−5", "27"):
+        control.get_by_role("textbox").fill(typed)
+        control.get_by_role("textbox").press("Enter")
+        view.wait_for_timeout(100)
+        told = control.locator(".snapped")
+        said[typed] = (
+            told.inner_text() if told.count() else "",
+            control.get_by_role("textbox").input_value(),
+        )
     assert said == {
         "31": ("nearest computed: 27 (31 was asked)", "27"),
         "2000": ("nearest computed: 400 (2000 was asked)", "400"),
@@ -195,61 +201,46 @@ def test_a_typed_value_that_was_not_computed_is_told_with_the_one_that_is_shown(
     }
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
 @pytest.mark.parametrize(
     ("name", "keys"), [("design", ".legend i"), ("source", ".legend i"), ("two_area", "svg")]
 )
-def test_keys_of_a_legend_keep_their_colours_on_paper(name, keys):
+def test_keys_of_a_legend_keep_their_colours_on_paper(window, name, keys):
     """Browsers leave out the backgrounds that they print, and with them a key's only colour."""
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as tools:
-        browser = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
-        view = browser.new_page()
-        view.emulate_media(media="print")
-        view.goto((ROOT / ".docs" / "live" / f"{name}.html").as_uri())
-        printed = view.evaluate(
-            "keys => [...document.querySelectorAll(keys)].map(x => getComputedStyle(x).printColorAdjust)",
-            keys,
-        )
-        browser.close()
+    view = window()
+    view.emulate_media(media="print")
+    view.goto((ROOT / ".docs" / "live" / f"{name}.html").as_uri())
+    printed = view.evaluate(
+        "keys => [...document.querySelectorAll(keys)].map(x => getComputedStyle(x).printColorAdjust)",
+        keys,
+    )
     assert {*printed} == {"exact"}
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
-def test_no_page_is_wider_than_the_smallest_telephone():
+def test_no_page_is_wider_than_the_smallest_telephone(window):
     """A path in a heading, and the buttons beside the tabs, once were."""
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as tools:
-        browser = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
-        view = browser.new_page(viewport={"width": 320, "height": 800})
-        wide = {}
-        for path in PAGES:
-            view.goto(path.as_uri())
-            view.wait_for_function("document.body.innerText.length > 300")
-            wide[path.name] = view.evaluate("document.documentElement.scrollWidth")
-        browser.close()
+    view = window(viewport={"width": 320, "height": 800})
+    wide = {}
+    for path in PAGES:
+        view.goto(path.as_uri())
+        view.wait_for_function("document.body.innerText.length > 300")
+        wide[path.name] = view.evaluate("document.documentElement.scrollWidth")
     assert {name: width for name, width in wide.items() if width > 320} == {}
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
 @pytest.mark.parametrize("name", ["two_area", "kundur"])
-def test_a_telephone_shows_a_page_without_scrolling_sideways(name):
+def test_a_telephone_shows_a_page_without_scrolling_sideways(window, name):
     """A scenario's long title once made the page wider than the screen, and a mode's name hid who takes part in it."""
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as tools:
-        browser = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
-        view = browser.new_page(viewport={"width": 390, "height": 844})
-        view.goto((ROOT / ".docs" / "live" / f"{name}.html").as_uri())
-        view.get_by_role("button", name="What is a mode?").wait_for()
-        view.locator("td.text").first.wait_for()
-        hidden = view.evaluate(
-            "[document.documentElement, ...document.querySelectorAll('.scroll')]"
-            ".map(part => part.scrollWidth - part.clientWidth)"
-        )
-        signs = view.evaluate(
-            "[...document.querySelectorAll('svg text')].map(text => text.textContent)"
-        )
-        browser.close()
+    view = window(viewport={"width": 390, "height": 844})
+    view.goto((ROOT / ".docs" / "live" / f"{name}.html").as_uri())
+    view.get_by_role("button", name="What is a mode?").wait_for()
+    view.locator("td.text").first.wait_for()
+    hidden = view.evaluate(
+        "[document.documentElement, ...document.querySelectorAll('.scroll')]"
+        ".map(part => part.scrollWidth - part.clientWidth)"
+    )
+    signs = view.evaluate(
+        "[...document.querySelectorAll('svg text')].map(text => text.textContent)"
+    )
     assert max(hidden) == 0
     powers = [text for text in signs if re.fullmatch(r"[-−]?\d\.\d+e.*", text)]
     assert powers
