@@ -513,17 +513,15 @@ def test_limits_that_do_not_settle_are_not_kept_as_the_message_says(gfor, tmp_pa
 
 def texts_of(path):
     """Texts in a module, with what stands in braces in its code; no documentation."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    nodes = [*ast.walk(ast.parse(path.read_text(encoding="utf-8")))]
     bodies = [
-        node.body
-        for node in ast.walk(tree)
-        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef))
+        node.body for node in nodes if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef))
     ]
     left = {id(one.value) for body in bodies for one in body if isinstance(one, ast.Expr)}
-    for joined in (node for node in ast.walk(tree) if isinstance(node, ast.JoinedStr)):
+    for joined in (node for node in nodes if isinstance(node, ast.JoinedStr)):
         left |= {id(part) for part in joined.values}
         yield "".join(_text_of(part) for part in joined.values)
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in left:
             yield node.value
 

@@ -18,6 +18,8 @@ SCENARIOS = ["--scenario", "base", "--scenario", "pod_p"]
 ROOT = Path(__file__).parents[3]
 VALIDATION = ROOT / ".docs" / "validation"
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 @pytest.fixture(scope="module")
 def studied(tmp_path_factory):

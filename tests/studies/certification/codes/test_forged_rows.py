@@ -42,10 +42,16 @@ from tests.support.grid_codes import replace_code
 CODE = CODES["fingrid"]
 
 
-@pytest.fixture
-def fails(tmp_path, fmu_path):
+@pytest.fixture(scope="module")
+def original(tmp_path_factory, fmu_path):
     """A certificate of Fingrid's table on powers that never move: jumps are not opposed, and the rest is met."""
-    return issued_in(tmp_path, fmu_path("gfor"))
+    return issued_in(tmp_path_factory.mktemp("issued"), fmu_path("gfor"))
+
+
+@pytest.fixture
+def fails(original, tmp_path):
+    """A copy of that certificate, to be changed."""
+    return shutil.copytree(original, tmp_path / "certificate")
 
 
 def issued_in(folder, tested, declared=None):
