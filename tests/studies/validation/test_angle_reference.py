@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
 from tests.studies.validation.recordings import run, table, with_noise
 from tests.studies.validation.test_planted import asked, of_frequency
+from tests.support.late import LateLibrary
 
+scipy_signal = LateLibrary("scipy.signal")
 KIND = "angle reference"
 
 
@@ -39,7 +40,7 @@ def with_frequency(frame, good, lag=0.0):
     hertz = of_frequency(good).f_hz.to_numpy()
     if lag:
         part = 1e-3 / lag
-        hertz = hertz[0] + lfilter([part], [1, part - 1], hertz - hertz[0])
+        hertz = hertz[0] + scipy_signal.lfilter([part], [1, part - 1], hertz - hertz[0])
     return frame.assign(f_hz=hertz)
 
 

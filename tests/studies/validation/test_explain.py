@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
 import orchestrator as gfor_in_python
 from orchestrator.studies.validation.cause_numbers import Promise, numbers_by_factors
@@ -15,7 +14,9 @@ from orchestrator.studies.validation.parameters import Adjustable
 from orchestrator.studies.validation.questions import QuestionKind
 from orchestrator.studies.validation.words import explanation_sentence, sentence
 from tests.studies.validation.recordings import run, table, with_noise
+from tests.support.late import LateLibrary
 
+scipy_signal = LateLibrary("scipy.signal")
 ON = {"pod_p.enabled": True}
 STEP = "200 us"
 
@@ -305,8 +306,8 @@ def test_an_error_that_is_noise_has_no_cause_and_one_clearly_beyond_it_has():
 
 def test_no_cause_is_likely_beside_a_right_model():
     """With this noise a filter's reactance, a droop's time and a resistance explained 70 to 100 %."""
-    frame = with_noise(table(run(stop=6.0)), seed=11).set_index("time")
-    found = gfor_in_python.validate("gfor", frame, values=ON, explain=True)
+    frame = with_noise(table(run("pod_p", stop=4.0)), seed=11).set_index("time")
+    found = gfor_in_python.validate("gfor", frame, values=ON, explain=True, step=STEP)
     causes = found.result.explanations
     assert causes[0].share > 0.9
     assert not any(one.explains for one in causes)
@@ -332,7 +333,9 @@ def test_a_cause_beside_another_is_not_said_to_be_all():
 def behind_a_lag(frame, column, seconds=0.1):
     part = 1e-3 / seconds
     first = frame[column][0]
-    return frame.assign(**{column: lfilter([part], [1, part - 1], frame[column] - first) + first})
+    return frame.assign(
+        **{column: scipy_signal.lfilter([part], [1, part - 1], frame[column] - first) + first}
+    )
 
 
 def test_a_lag_that_leaves_noise_alone_is_the_cause_and_nothing_is_tried_beside_it():

@@ -10,7 +10,7 @@ from tests.studies.validation.recordings import run, table, with_noise
 def lasting(**values):
     frame = with_noise(table(run("pod_p", stop=4.0, **values))).set_index("time")
     values = {"pod_p.enabled": True}
-    found = gfor_in_python.validate("gfor", frame, values=values, limits=EXAMPLE)
+    found = gfor_in_python.validate("gfor", frame, values=values, limits=EXAMPLE, step="200 us")
     return found, lasting_errors(found.result.comparisons)
 
 

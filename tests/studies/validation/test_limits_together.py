@@ -1,6 +1,7 @@
 """Limits of two axes: both are named where both are off, and neither is judged where the plant does not reach it."""
 
 from dataclasses import replace
+from functools import cache
 
 import pytest
 
@@ -24,6 +25,7 @@ FAULT = {
 }
 
 
+@cache
 def bench_of(**limits):
     """A model with limits of 1.1 pu beside a plant with others, in a fault at which it reaches both."""
     case = gfor_in_python.load("two_area").with_(

@@ -41,7 +41,7 @@ def recorded():
 
 def validated(frame, values, **more):
     return gfor_in_python.validate(
-        "gfor", frame.set_index("time"), values=values, step=STEP, **more
+        "gfor", frame.set_index("time"), values=values, **{"step": STEP} | more
     )
 
 
@@ -74,7 +74,7 @@ def test_a_model_without_the_plants_limit_makes_no_minutes_of_seconds():
     )
     limited = {"gfor.current_limit.kind": 3, "gfor.current_limit.I_max": 1.002}
     frame = with_noise(table(case.scenario("pod_p", limited).run(stop=4.0).dataset))
-    assert "time unit" not in kinds(validated(frame, {"pod_p.enabled": True}))
+    assert "time unit" not in kinds(validated(frame, {"pod_p.enabled": True}, step="500 us"))
 
 
 @pytest.mark.parametrize(

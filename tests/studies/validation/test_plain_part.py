@@ -15,6 +15,7 @@ from orchestrator.studies.validation.words import explanation_sentence
 from tests.studies.validation.recordings import run, table, with_noise, written
 
 ON = {"pod_p.enabled": True}
+STEP = "500 us"  # of the device, where no value is found to a part in thousand
 LIMIT = "voltage_control.i_q_max"
 FOUND = Explanation(CauseKind.VALUE, LIMIT, "pu", 1.1, 0.9218, 0.17, 0.013, noise=2e-4)
 """Found while the model was held in step beside a plant with 0.93."""
@@ -29,15 +30,15 @@ def limited(tmp_path_factory):
     return written(frame, tmp_path_factory.mktemp("limited"))
 
 
-def part_of(recording, cause, **values):
-    found = gfor_in_python.validate("gfor", recording, values=ON | values, step="200 us").result
+def part_of(recording, cause, step=STEP, **values):
+    found = gfor_in_python.validate("gfor", recording, values=ON | values, step=step).result
     device = found.request.device
     with device.shelf.keeping():
         return plain_part(device, [one.event for one in found.comparisons], cause)
 
 
 def test_a_limit_is_found_again_before_the_model_leaves_and_the_command_confirms_it(gfor, limited):
-    part = part_of(limited, FOUND)
+    part = part_of(limited, FOUND, step="200 us")
     assert part.values[LIMIT] == pytest.approx(0.93, rel=3e-4)
     assert part.confirms
     assert not part.to_end
@@ -46,8 +47,8 @@ def test_a_limit_is_found_again_before_the_model_leaves_and_the_command_confirms
     (typed,) = re.findall(r"confirm it with (--set .*? --stop [\d.]*\d)", said)
     errors = []
     for given in (typed, typed.partition("--stop")[1] + typed.partition("--stop")[2]):
-        options = ("--set", "pod_p.enabled=true", *shlex.split(given), "--json")
-        _, out, _ = gfor("validate", "gfor", str(limited), *options)
+        options = ("--set", "pod_p.enabled=true", *shlex.split(given), "--step", "200 us")
+        _, out, _ = gfor("validate", "gfor", str(limited), *options, "--json")
         (event,) = json.loads(out)["events"]
         errors.append(max(w["p"]["mean_abs_error_pu"] for w in event["windows"]))
     assert errors[0] < 0.1 * errors[1]
