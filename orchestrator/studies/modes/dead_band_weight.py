@@ -1,4 +1,4 @@
-"""Whether a loop that rests within its dead band grows beyond it, where that is cheap to say.
+"""Tell whether a loop that rests within its dead band grows beyond it, where that is cheap to say.
 
 Modes at the operating point are without such a loop, and call a system stable that oscillates across the band."""
 
