@@ -123,8 +123,8 @@ def _compute(
     terminal.say("question", weights)
     whole = len(results) == 1 or options.details
     for result in results:
-        if request.critical is not None and not result.modes:
-            none = _none_below(result, request.critical, request.frequencies)
+        if result.critical is not None and not result.modes:
+            none = _none_below(result, result.critical, request.frequencies)
             console.print(escape(none), highlight=False, soft_wrap=True)
         elif whole:
             console.print(all_modes(result, whole=options.details), "")

@@ -137,8 +137,12 @@ def _step_warnings(
     worst = max(pairs, key=lambda pair: (_is_slow(pair) and pair.is_lost, pair.error), default=None)
     moved = worst is not None and worst.error > MOVED
     if worst is None or not moved:
-        return (_advice(master, system, pairs),) if stability.cause is Cause.COUPLING else ()
-    short = _short_step(master, system, pairs)
+        return (
+            (_advice(master, system, pairs, stability),)
+            if stability.cause is Cause.COUPLING
+            else ()
+        )
+    short = _short_step(master, system, pairs, stability)
     text = (
         f"the communication step of {step:g} s {'does not resolve' if worst.is_lost else 'moves'} a mode: the step map "
         f"has {_in_words(worst.seen)} where the system without a communication step has {_in_words(worst.exact)}"
@@ -157,8 +161,10 @@ def _step_warnings(
     return (f"{text}; {_take(short)}",)
 
 
-def _advice(master: Master, system: LinearModel, pairs: Sequence[Pair]) -> str:
-    short = _short_step(master, system, pairs)
+def _advice(
+    master: Master, system: LinearModel, pairs: Sequence[Pair], stability: Stability
+) -> str:
+    short = _short_step(master, system, pairs, stability)
     if short is None:
         return "no shorter step that was tried has a stable coupling; see that the schedule has devices before the grid"
     return f"against the unstable coupling, {_take(short)}"
@@ -215,10 +221,16 @@ def _nearest(model: LinearModel) -> Callable[[complex], complex]:
     return lambda wanted: complex(values[np.argmin(np.abs(values - wanted))])
 
 
-def _short_step(master: Master, system: LinearModel, pairs: Sequence[Pair]) -> float | None:
+def _short_step(
+    master: Master, system: LinearModel, pairs: Sequence[Pair], stability: Stability
+) -> float | None:
     """The longest step tried [s] that moves no mode and leaves the coupling stable; None if every step fails."""
     exact = list(dict.fromkeys(pair.exact for pair in pairs))
-    limit = max(0.0, float(eigenvalues(system).real.max(initial=0.0))) + _GROWTH
+    if len(system.names) > WHOLE:  # too large for all eigenvalues; what grows has been searched
+        fastest = stability.continuous_growth_rate or 0.0
+    else:
+        fastest = float(eigenvalues(system).real.max(initial=0.0))
+    limit = max(0.0, fastest) + _GROWTH
     shorter = [step for step in _ADVISED if step <= 0.51 * master.clock.step_size]
     for step in shorter[:_TRIALS]:
         try:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from orchestrator.core.errors import AnalysisError
 from orchestrator.linear.models.linear_model import LinearModel
+from orchestrator.linear.spectra.block_arnoldi import VectorRoom
 from orchestrator.linear.spectra.critical_modes import Search, nearest_pairs
 from orchestrator.linear.spectra.modes import Mode, make_mode
 
@@ -25,13 +26,20 @@ _RING = 1.6  # ratio of the radii of a ring
 _AT_A_TIME = (20, 80)
 _STANDS_OUT = 1.1  # multipliers of a step map beyond this size are found as the largest ones
 _THINNEST = 1e-3  # smallest size of a sector, relative to its radius
+_BESIDE = 1e-4  # part of an eigenvalue by which the point that gives its vectors lies beside it
+_NEAREST = 2  # so many modes are found there, of which one is it
 
 
 @dataclass(frozen=True)
 class GrowthSearch:
-    """The growing modes [rad/s], fastest first, and a sentence on the region that was not searched."""
+    """The growing modes of a system.
 
-    modes: tuple[Mode, ...]
+    ``eigenvalues``: All of them [rad/s], one of each pair, fastest growth first.
+    ``fastest``: The mode that grows fastest; None if none grows.
+    ``not_searched``: A sentence on the region that was not searched."""
+
+    eigenvalues: tuple[complex, ...]
+    fastest: Mode | None
     not_searched: str
 
 
@@ -71,27 +79,34 @@ class _Sector:
 
 
 def find_growing_modes(model: LinearModel) -> GrowthSearch:
-    """Every mode that grows, of a step map or continuous matrix of any size."""
+    """Every mode that grows, of a step map or continuous matrix of any size. Only the fastest gets its vectors."""
     H = model.step_size
     farthest = FASTEST if H is None else np.pi / H
     rings = 1 + int(np.ceil(np.log(farthest / SLOWEST) / np.log(_RING)))
     radii = np.geomspace(SLOWEST, farthest, rings).tolist()
-    found = [] if H is None else _standing_out(model, H)
     limit = np.inf if H is None else np.log(_STANDS_OUT) / H
+    found = [] if H is None else _standing_out(model, H)
     waiting = [sector for inner, outer in pairwise(radii) for sector in _ring(inner, outer, limit)]
+    rooms = (VectorRoom(), VectorRoom())
     while waiting:
         sector = waiting.pop()
-        modes = _modes_in(model, sector)
-        if modes is None:
+        values = _values_in(model, sector, rooms)
+        if values is None:
             if sector.outer - sector.inner < _THINNEST * sector.outer:
                 here = f"{_AT_A_TIME[1]} modes lie at {sector.centre:.4g} rad/s"
                 raise AnalysisError(f"more than {here}; compute the full spectrum instead")
             waiting += sector.parts()
         else:
-            found += [mode for mode in modes if mode.eigenvalue.real <= limit]
-    found.sort(key=lambda mode: -mode.eigenvalue.real)
+            found += [value for value in values if value.real <= limit]
+    found.sort(key=lambda value: -value.real)
     beyond = f"|λ| below {SLOWEST:.2g} rad/s and above {farthest:.3g} rad/s were not searched"
-    return GrowthSearch(tuple(found), beyond)
+    return GrowthSearch(tuple(found), _mode_at(model, found[0]) if found else None, beyond)
+
+
+def _mode_at(model: LinearModel, found: complex) -> Mode:
+    """The mode whose eigenvalue [rad/s] was found."""
+    pairs = nearest_pairs(model, found + _BESIDE * abs(found), _NEAREST)
+    return make_mode(*min(pairs, key=lambda pair: abs(pair[0] - found)), model.names)
 
 
 def _ring(inner: float, outer: float, limit: float) -> list[_Sector]:
@@ -102,8 +117,8 @@ def _ring(inner: float, outer: float, limit: float) -> list[_Sector]:
     return [_Sector(inner, outer, *angles) for angles in pairwise((low - 1e-9, *middle, np.pi / 2))]
 
 
-def _standing_out(model: LinearModel, step_size: float) -> list[Mode]:
-    """Modes of a step map that grow so fast that their multipliers are far larger than all others."""
+def _standing_out(model: LinearModel, step_size: float) -> list[complex]:
+    """Eigenvalues of a step map that grow so fast that their multipliers are far larger than all others."""
     n = len(model.names)
     step = spla.LinearOperator((n, n), matvec=model.apply, dtype=float)
     start = np.random.default_rng(0).standard_normal(n)
@@ -119,23 +134,32 @@ def _standing_out(model: LinearModel, step_size: float) -> list[Mode]:
         raise AnalysisError(
             f"more than {count} modes grow by a tenth in each communication step; take a shorter one"
         )
-    pairs = [
-        nearest_pairs(model, complex(np.log(value.astype(complex)) / step_size), 1)[0]
-        for value in mu
-    ]
-    return [make_mode(*pair, model.names) for pair in pairs]
+    return [complex(np.log(value.astype(complex)) / step_size) for value in mu]
 
 
-def _modes_in(model: LinearModel, sector: _Sector) -> list[Mode] | None:
-    """The growing modes of a sector; None if more eigenvalues than are looked for lie around it."""
+def _values_in(
+    model: LinearModel, sector: _Sector, rooms: tuple[VectorRoom, VectorRoom]
+) -> list[complex] | None:
+    """The growing eigenvalues of a sector; None if more of them than are looked for lie around it."""
+    search = Search(model, sector.centre, rooms)
+    if model.is_searched_in_blocks:
+        values = search.reaching(float(np.abs(sector.edge - sector.centre).max()), sector.holds)
+    else:
+        values = _one_by_one(model, sector, search)
+    return None if values is None else [value for value in values.tolist() if sector.holds(value)]
+
+
+def _one_by_one(
+    model: LinearModel, sector: _Sector, search: Search
+) -> NDArray[np.complex128] | None:
+    """All eigenvalues around a sector, of a model with which a search takes one vector at a time."""
     H = model.step_size
-    search = Search(model, sector.centre)
     edge = sector.edge if H is None else np.exp(sector.edge * H)
     needed = float(np.abs(edge - search.sigma).max())
     count, most = _AT_A_TIME
     while count <= most:
         values = search.nearest(count)
         if search.reach > needed:
-            return search.modes([k for k, value in enumerate(values) if sector.holds(value)])
+            return values
         count *= 2
     return None

@@ -393,12 +393,12 @@ def _look_at(model: LinearModel, spectrum: Spectrum | None) -> Stability:
     """The verdict on one model alone."""
     if spectrum is None:
         search = find_growing_modes(model)
-        mode = search.modes[0] if search.modes else None
+        mode = search.fastest
         n = len(model.names)
         return Stability(
-            not search.modes,
+            mode is None,
             mode,
-            growing=len(search.modes),
+            growing=len(search.eigenvalues),
             zeros=0,
             eigenvalues=n,
             cause=Cause.SYSTEM if mode else None,

@@ -20,6 +20,7 @@ from orchestrator.cases.scenario.flow_figures import power_flow_json
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.scenario.service import in_service
 from orchestrator.core.errors import ComponentError
+from orchestrator.core.options import Option
 from orchestrator.core.threads import side_by_side
 from orchestrator.devices.binding.misfits import Misfit
 from orchestrator.linear.doubts.common_speed import name_common_speed, tell_common_speed
@@ -58,6 +59,9 @@ from orchestrator.systems.coupling.master import Master
 # another
 _LEADING = 3
 
+SPARSE_BELOW = 0.2
+"""Damping ratio below which a system too large for all its eigenvalues is searched where nobody asks for another."""
+
 BlackBoxes = Callable[[Master], Mapping[str, ComponentLinearization]]
 """Identifies components of a running system that hide their states."""
 
@@ -87,6 +91,8 @@ class ModesResult:
     # why no mode bears a name that the case gives, by name
     unnamed: Mapping[str, str] = field(default_factory=dict)
     misfits: Mapping[str, list[Misfit]] = field(default_factory=dict)
+    # damping ratio below which modes were looked for; None where all were
+    critical: float | None = None
 
     @property
     def label(self) -> str:
@@ -154,8 +160,8 @@ def compute_modes(
 ) -> ModesResult:
     """Initialise a scenario's FMUs, verify their steady state, and linearise around it.
 
-    ``critical``: damping ratio below which modes are looked for, by sparse search; None for the full spectrum. The
-    search knows too little to give modes their names.
+    ``critical``: damping ratio below which modes are looked for, by sparse search; None for the full spectrum, or
+    `SPARSE_BELOW` in a system too large for that. The search knows too little to give modes their names.
     ``directional``: linearise with the FMUs' own directional derivatives instead of by perturbation."""
     with running(in_service(prepared)) as master:
         return modes_of(prepared, master, frequency_range, critical, directional=directional)
@@ -279,6 +285,10 @@ class Linearised:
         )
         self._black_boxes = black_boxes
         self._model, self._system = model_of(master, blocks), continuous_model(master, blocks)
+        states = len(self._model.names)
+        if critical is None and states > WHOLE:
+            self._critical = SPARSE_BELOW
+            self._said += (_too_large(states, frequency_range),)
         self.named: NamedSystem | None = None
         self._of_system: Future[spectra.Spectrum | Decay | None]
 
@@ -436,7 +446,20 @@ class Linearised:
             eigenvalues=eigenvalues,
             fit_errors=fit_errors,
             unnamed=naming.reasons,
+            critical=self._critical,
         )
+
+
+def _too_large(states: int, frequency_range: tuple[float, float]) -> str:
+    low, high = frequency_range
+    return (
+        f"{states} states are too many for all eigenvalues (at most {WHOLE}): modes from {low:g} to {high:g} Hz with "
+        f"less than {100 * SPARSE_BELOW:g} % damping are found by sparse search; "
+        + Option.CRITICAL
+        + " and "
+        + Option.RANGE
+        + " take others"
+    )
 
 
 def identified(
