@@ -233,5 +233,6 @@ def _newton_correction(master: Master, n: int, change: Matrix, *, once: bool) ->
     right = np.zeros(len(model.names))
     right[:n] = change
     # A turn of all angles changes nothing, so I − A is singular. The shift keeps the solution from moving along it.
-    solution: Matrix = -model.shifted(1 + _SHIFT).solve(right)[:n]
+    solved = model.shifted(1 + _SHIFT).solve_exactly(right)
+    solution: Matrix = -np.real(solved)[:n]  # a divided hub solves in complex numbers
     return solution

@@ -1,5 +1,7 @@
 """Units around a network whose port voltages depend on all of them, against dense matrices."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.linalg
@@ -134,6 +136,32 @@ def test_on_an_eigenvalue_of_a_unit_alone_the_whole_is_factorised():
         b = np.ones(STATES, dtype=complex)
         x = model.shifted(sigma).solve(b)
         assert np.allclose(model.A @ x - sigma * x, b, atol=1e-8)
+
+
+LARGE = 1e5  # so much more others take of some states, as a fast filter does
+
+
+def with_integrators():
+    """The same where a state of some units is moved by nothing, as an integrator at the sum that it holds."""
+    given = system()
+    third = np.arange(2, UNITS, 3)
+    F, G, H = given.F.toarray(), given.G.toarray(), given.H.toarray()
+    F[third], G[third] = 0.0, 0.0
+    H[:, third] *= LARGE
+    return replace(given, F=sp.csr_array(F), G=sp.csr_array(G), H=sp.csr_array(H))
+
+
+@pytest.mark.parametrize("part", [1.0, 1 + 1j])
+def test_next_to_zeros_rounding_is_no_reason_to_factorise_the_whole(part):
+    """States are far larger than the right side there, and no solution leaves over less of it than rounding."""
+    model, sigma = with_integrators(), 1e-4 * part
+    b = np.ones(STATES).astype(type(part))
+    shifted = model.A - sigma * np.eye(STATES)
+    factors = model.hub.at(sigma)
+    assert factors is not None
+    assert not next(factors.left_over(b)).of_right <= hub_elimination._ACCURATE
+    found, dense = factors.solve_exactly(b), np.linalg.solve(shifted, b)
+    assert np.abs(found - dense).max() < 1e-9 * np.abs(dense).max()
 
 
 def test_critical_modes_are_those_of_the_full_spectrum():

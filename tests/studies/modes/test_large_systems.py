@@ -23,8 +23,10 @@ def test_modes_are_searched_where_there_are_too_many_states_for_all(large, monke
     below = [mode.eigenvalue for mode in whole.modes if mode.damping_ratio < study.SPARSE_BELOW]
     assert 0 < len(below) < len(whole.modes)
     assert [mode.eigenvalue for mode in found.modes] == pytest.approx(below, rel=1e-6)
-    assert found.stability.stable is whole.stability.stable is True
-    assert "the right half-plane was searched" in found.stability.sentence()
+    assert found.stability.stable is whole.stability.stable is False  # the common speed drifts
+    assert found.stability.growing == whole.stability.growing
+    rate = pytest.approx(whole.stability.largest_growth_rate, rel=1e-6)
+    assert found.stability.largest_growth_rate == rate
     said = [text for text in found.warnings if "too many for all eigenvalues" in text]
     assert len(said) == 1
     assert f"at most {FEW}" in said[0]
