@@ -77,12 +77,12 @@ def test_it_follows_its_diagram(changed):
     values = QUICK | changed
     diagram, wanted = Diagram(values), []
     fine = 10
-    for k in range(6000):
+    for k in range(4000):
         w, P_e = swings(k * STEP)
         for _ in range(fine):
             diagram.step(w, P_e, STEP / fine)
         wanted.append(diagram.signal(w))
-    got, _ = added(values, 6.0, swings)
+    got, _ = added(values, 4.0, swings)
     assert np.abs(got - wanted).max() < 2e-3
     assert np.ptp(wanted) > 0.1
 

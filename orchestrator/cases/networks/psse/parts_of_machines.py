@@ -146,7 +146,9 @@ class PartsOfMachines:
                 continue
             name = self.names[key]["supervisor"]
             record = next(one for one in self.records[key] if one.name == name)
-            whose = f"{self.names[key]['governor']} has none" if governor else "it has no governor"
+            whose = (
+                f"{self.names[key]['governor']} has none" if governor else "it has no record of one"
+            )
             self.problems.append(
                 f"{record.place}: {name} moves the power reference of the governor of machine {record.machine!r} at "
                 f"bus {record.bus}, and {whose}; write {without_models([name])}"

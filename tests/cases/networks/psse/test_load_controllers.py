@@ -52,7 +52,7 @@ def test_left_out_the_governor_is_as_without_it(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "whose"),
-    [(GENROU + LCFB1, "it has no governor"), (GENROU + DEGOV + LCFB1, "DEGOV has none")],
+    [(GENROU + LCFB1, "it has no record of one"), (GENROU + DEGOV + LCFB1, "DEGOV has none")],
 )
 def test_without_a_reference_to_move_it_is_refused_with_what_goes_on(text, whose, tmp_path):
     with pytest.raises(InputError) as refused:
