@@ -63,7 +63,7 @@ class HubSolver(Protocol):
 
 @dataclass(frozen=True)
 class LeftOver:
-    """What a solution leaves over of its equations.
+    """The rest of its equations that a solution leaves over.
 
     ``of_right``: as a part of the right side's largest element.
     ``of_terms``: as a part of the largest sum of the sizes of an equation's terms."""
