@@ -1,4 +1,4 @@
-"""Record REGFMA1 of a PSS/E dynamics file (DYR) → parameters of `regfm_a1_phasor`."""
+"""Records REGFMA1 and GDFORM of a PSS/E dynamics file (DYR) → parameters of `regfm_a1_phasor`."""
 
 from fmus.toolchain.dyr_form import records_beside
 

@@ -37,7 +37,7 @@ _SOURCES = {
     "supervisor": "STEPS' reader and model of LCFB1, IEC 61970-302, PowerWorld's help on LCFB1_PTI"
 }
 """Sources of the records of machines that are of a kind of their own."""
-_REGFM = "WECC's specification of REGFM_A1"
+_REGFM = "WECC's specification of REGFM_A1; GDFORM as GridPACK reads it"
 _REGFM_B1 = "WECC's specification of REGFM_B1, in PNNL's script for PSS/E"
 _LOADS = "GridPACK's reader and model"
 _OF_SEVERAL = "WECC's REPC_B as PowerWorld's help lists it; fields as InterPSS reads them"

@@ -60,11 +60,22 @@ def test_regfm_a1_is_the_whole_unit_with_its_own_values(tables):
     assert found["sg1"].machine == "genrou"
 
 
-def test_every_field_sets_a_parameter_of_the_model():
-    record = REGFM_A1_RECORDS["REGFMA1"]
+def test_gridpack_s_record_is_the_same_unit(tables):
+    """GDFORM has REGFMA1's values but for QVFlag, in the order of GridPACK's reader."""
+    same = (
+        "3 'GDFORM' 1  0.06 0.0 5.86 0.02 0.05 0.2 0.95 -0.9 1.15 0.0 0.02 1.8 0.44 -0.4 3.0 20.0 "
+        "0.03 0.04 1 /"
+    )
+    found, wanted = tables(MACHINES.replace(REGFM, same))["gfor3"], tables()["gfor3"]
+    assert (found.model, found.parameters) == (wanted.model, wanted.parameters)
+
+
+@pytest.mark.parametrize(("name", "count"), [("REGFMA1", 20), ("GDFORM", 19)])
+def test_every_field_sets_a_parameter_of_the_model(name, count):
+    record = REGFM_A1_RECORDS[name]
     known = {v.name for v in build_model(record.part).parameters}
     assert {p for field in record.fields for p in field.parameters} <= known
-    assert len(record.fields) == 20
+    assert len(record.fields) == count
 
 
 @pytest.mark.parametrize(
