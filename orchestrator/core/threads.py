@@ -1,8 +1,8 @@
 """One thread for linear algebra on small or sparse matrices: several threads would only wait for each other."""
 
 import threading
-from collections.abc import Iterator
-from concurrent.futures import Executor, ThreadPoolExecutor
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
 from functools import cache
 from typing import Any
@@ -16,16 +16,30 @@ def one_thread() -> AbstractContextManager[Any]:
     return limited
 
 
+class _InTurn(Executor):
+    """Computes what is submitted at once, in the thread that submits it."""
+
+    def submit(self, compute: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
+        found: Future[Any] = Future()
+        try:
+            found.set_result(compute(*given, **named))
+        except Exception as error:  # for whoever asks for the result
+            found.set_exception(error)
+        return found
+
+
 @contextmanager
-def side_by_side() -> Iterator[Executor]:
+def side_by_side(*, pays: bool = True) -> Iterator[Executor]:
     """Inside ``with``, two more threads compute what is submitted; all of it has ended where the block ends.
 
     It pays for what spends its time in linear algebra that lets other threads of Python run, as NumPy's does. BLAS uses
     one thread on each side, so that both cores work and no last digit depends on their number. What is submitted must
     not touch an FMU, nor what the block changes.
 
+    ``pays``: Whether it is worth two threads; else everything is computed in turn.
+
     Yields its ``submit(compute).result()`` raises what ``compute`` raised."""
-    with one_thread(), ThreadPoolExecutor(2) as pool:
+    with one_thread(), ThreadPoolExecutor(2) if pays else _InTurn() as pool:
         try:
             yield pool
         except BaseException:

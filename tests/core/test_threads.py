@@ -37,6 +37,21 @@ def test_an_error_of_a_computation_comes_with_its_result():
         found.result()
 
 
+def test_where_threads_do_not_pay_all_is_computed_in_turn():
+    """The thread that submits computes at once, with one thread of BLAS, and an error comes with its result."""
+
+    def fail():
+        raise AnalysisError("it does not converge")
+
+    with side_by_side(pays=False) as pool:
+        found, failed = pool.submit(threading.get_ident), pool.submit(fail)
+        assert found.done()
+        assert pool.submit(blas_threads).result() == {1}
+    assert found.result() == threading.get_ident()
+    with pytest.raises(AnalysisError, match="does not converge"):
+        failed.result()
+
+
 def test_what_has_not_begun_is_given_up_where_the_block_fails():
     go_on, begun = threading.Event(), threading.Semaphore(0)
 

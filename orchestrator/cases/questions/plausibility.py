@@ -200,19 +200,14 @@ def _check_meant(draft: Draft) -> None:
 def _doubts(draft: Draft) -> Iterator[UnusualValue]:
     for name, plan in draft.system.components.items():
         for variable in plan.description.parameters:
-            wanted, value = plan.description.variables[variable].usual, value_of(plan, variable)
+            wanted = plan.description.variables[variable].usual
+            value = None if wanted is None else value_of(plan, variable)
             if wanted is not None and value is not None and _has_effect(plan, variable):
                 scale, bases = _to_rating(draft, name, variable)
                 yield from outside(draft, name, variable, value, wanted, scale=scale, bases=bases)
-        for own, of_lead, of_lag in _LEADS:
+        for own, of_lead, of_lag in _LEADS if plan.kind == "machine" else ():
             lead, lag = value_of(plan, of_lead), value_of(plan, of_lag)
-            if (
-                plan.kind == "machine"
-                and lead
-                and lag
-                and lead > 2 * lag
-                and value_of(plan, own) is not None
-            ):
+            if lead and lag and lead > 2 * lag and value_of(plan, own) is not None:
                 text = f"{of_lead} = {lead:g} s, the lead, exceeds {of_lag} = {lag:g} s, the lag; are the two swapped?"
                 place = place_of(draft, name, of_lead, of_lag)
                 kind = f"{of_lead} above {of_lag}"

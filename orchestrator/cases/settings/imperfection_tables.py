@@ -3,6 +3,7 @@
 import fnmatch
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
@@ -89,7 +90,6 @@ def note_long_delay(draft: Draft, delay: float, stop: float, where: str) -> None
 def _overridden(
     draft: Draft, tables: Mapping[str, tuple[schema.ImperfectionTable, str]]
 ) -> dict[str, tuple[schema.ImperfectionTable, str]]:
-    adapter: TypeAdapter[schema.ImperfectionTable] = TypeAdapter(schema.ImperfectionTable)
     found = dict(tables)
     for layer in draft.given.layers:
         for key, value in layer.values.items():
@@ -104,10 +104,16 @@ def _overridden(
                 continue
             content = found[name][0].model_dump(exclude_unset=True) | {field: value}
             try:
-                found[name] = adapter.validate_python(content), layer.place(key)
+                found[name] = _adapter().validate_python(content), layer.place(key)
             except ValidationError as error:
                 draft.note(layer.place(key), f"{key} = {value!r}: {fault_of(error.errors()[0])}")
     return found
+
+
+@cache
+def _adapter() -> TypeAdapter[schema.ImperfectionTable]:
+    """What validates a table; it takes a millisecond to make."""
+    return TypeAdapter(schema.ImperfectionTable)
 
 
 def imperfection_of(

@@ -1,6 +1,7 @@
 """How an FMU is brought to life: in this process or in one of its own, behind a binding or not."""
 
 import filecmp
+from functools import cache
 from pathlib import Path
 
 from fmus.toolchain.cache import cache_directory, intact
@@ -25,13 +26,19 @@ def is_ours(path: Path) -> bool:
 
     What a file says of itself does not count, nor does its place: a built file that was changed since is a stranger."""
     built = cache_directory("fmus")
-    if path.resolve().is_relative_to(built.resolve()):
+    if path.resolve().is_relative_to(_resolved(built)):
         return intact(path) or not path.exists()  # described already, and built before it runs
     size = path.stat().st_size
     return any(
         file.stat().st_size == size and filecmp.cmp(path, file, shallow=False) and intact(file)
         for file in built.glob("*/*.fmu")
     )
+
+
+@cache
+def _resolved(folder: Path) -> Path:
+    """A folder without links; one that is elsewhere later holds no file that is ours by its place alone."""
+    return folder.resolve()
 
 
 def compile_adapters(description: FmuDescription) -> None:

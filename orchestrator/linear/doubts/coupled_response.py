@@ -14,12 +14,11 @@ import numpy as np
 from orchestrator.core.arrays import Matrix
 from orchestrator.core.errors import ComponentError
 from orchestrator.core.options import Option
-from orchestrator.devices.fmi.instance import is_ours
-from orchestrator.devices.fmi.port_mapping import without_binding
 from orchestrator.linear.models.coupled_state import CoupledState
 from orchestrator.linear.models.delays import links_of, values_on_the_way
 from orchestrator.linear.models.linear_model import HELD, IDENTIFIED, LinearModel
 from orchestrator.linear.models.linearization import Blocks
+from orchestrator.linear.models.remembered import is_ours_in
 from orchestrator.linear.spectra.stability import Stability
 from orchestrator.systems.coupling.master import Master
 
@@ -66,11 +65,7 @@ class Disagreement:
 
 def foreign_components(master: Master) -> list[str]:
     """Components whose FMU this machine's own toolchain did not build."""
-    found = []
-    for name, plan in master.system.components.items():
-        if not is_ours(without_binding(plan.description).path):
-            found.append(name)
-    return found
+    return [name for name in master.system.components if not is_ours_in(master, name)]
 
 
 def confirmed(

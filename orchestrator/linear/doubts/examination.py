@@ -6,8 +6,9 @@ Inputs are held over a communication step. This delays every coupling by half a 
 proportion to the step; with one that is far too long, the step map's modes have no relation to the system. The
 continuous system, from the components' own derivatives, has the true modes."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse.linalg as spla
@@ -102,6 +103,9 @@ def check_resolution(
     modes: Sequence[Mode],
     frequency_range: tuple[float, float],
     stability: Stability,
+    *,
+    of_model: Spectrum | None = None,
+    of_system: Spectrum | None = None,
 ) -> tuple[str, ...]:
     """Warn of an unstable coupling, and compare the modes of a step map with those of the continuous system.
 
@@ -109,11 +113,14 @@ def check_resolution(
     compared. Raises `InputError` if a slow mode is lost, because the mode in its place would give a wrong verdict.
 
     ``stability``: Where the coupling is unstable, a step at which it is stable is looked for even if the modes are
-    resolved."""
+    resolved.
+    ``of_model``, ``of_system``: All eigenvalues of both models, where they are known already."""
     said = verdict_warnings(stability)
     if model.step_size is None or system is None:
         return said
-    pairs = _pairs(model, system, modes, frequency_range)
+    pairs = _pairs(
+        _Eigenvalues(model, of_model), _Eigenvalues(system, of_system), modes, frequency_range
+    )
     return (*said, *_step_warnings(master, model.step_size, system, pairs, stability))
 
 
@@ -187,9 +194,29 @@ def _is_slow(pair: Pair) -> bool:
     return min(abs(pair.seen.imag), abs(pair.exact.imag)) < 2 * np.pi * SLOW_HZ
 
 
+class _Eigenvalues:
+    """The eigenvalues of a model [rad/s]: all, computed where they are not known, or the one nearest to a given one."""
+
+    def __init__(self, model: LinearModel, known: Spectrum | None = None) -> None:
+        self._model, self._known = model, known
+
+    @property
+    def are_few(self) -> bool:
+        return len(self._model.names) <= DENSE
+
+    @cached_property
+    def all(self) -> NDArray[np.complex128]:
+        return eigenvalues(self._model) if self._known is None else self._known.eigenvalues
+
+    def nearest(self, wanted: complex) -> complex:
+        if not self.are_few:
+            return nearest_eigenvalue(self._model, wanted)
+        return complex(self.all[np.argmin(np.abs(self.all - wanted))])
+
+
 def _pairs(
-    model: LinearModel,
-    system: LinearModel,
+    of_step: _Eigenvalues,
+    of_system: _Eigenvalues,
     modes: Sequence[Mode],
     frequency_range: tuple[float, float],
 ) -> list[Pair]:
@@ -199,26 +226,16 @@ def _pairs(
     The reverse pairs show modes that the step map has lost altogether."""
     low, high = max(frequency_range[0], _SLOWEST_HZ), frequency_range[1]
     seen = [mode.eigenvalue for mode in modes if _swings(mode.eigenvalue, low, high)]
-    nearest = _nearest(system)
-    if len(system.names) > DENSE:
-        return [Pair(value, nearest(value)) for value in seen[:_COMPARED]]
-    of_step = _nearest(model)
-    exact = [complex(value) for value in eigenvalues(system) if _swings(value, low, high)]
-    return [Pair(value, nearest(value)) for value in seen] + [
-        Pair(of_step(value), value) for value in exact
+    if not of_system.are_few:
+        return [Pair(value, of_system.nearest(value)) for value in seen[:_COMPARED]]
+    exact = [complex(value) for value in of_system.all if _swings(value, low, high)]
+    return [Pair(value, of_system.nearest(value)) for value in seen] + [
+        Pair(of_step.nearest(value), value) for value in exact
     ]
 
 
 def _swings(value: complex, low: float, high: float) -> bool:
     return low <= value.imag / (2 * np.pi) <= high and -value.real <= SWINGING * abs(value)
-
-
-def _nearest(model: LinearModel) -> Callable[[complex], complex]:
-    """The eigenvalue [rad/s] of a model that is nearest to a given one."""
-    if len(model.names) > DENSE:
-        return lambda wanted: nearest_eigenvalue(model, wanted)
-    values: NDArray[np.complex128] = eigenvalues(model)
-    return lambda wanted: complex(values[np.argmin(np.abs(values - wanted))])
 
 
 def _short_step(
@@ -237,7 +254,7 @@ def _short_step(
             model = compose(Blocks(master, step), master.schedule)
         except CosimError:  # an FMU may refuse a step; others are left to try
             continue
-        nearest = _nearest(model)
+        nearest = _Eigenvalues(model).nearest
         if (
             all(Pair(nearest(value), value).error <= MOVED for value in exact)
             and _growth(model) <= limit
@@ -332,7 +349,16 @@ def examine(
         stability = replace(stability, stable=None, reason="; ".join(tell(turning)))
         found = [doubt for doubt in found if doubt not in turning]
         return Examination(stability, (*verdict_warnings(stability), *tell(found), *wires))
-    step = check_resolution(master, model, system, shown, frequency_range, stability)
+    step = check_resolution(
+        master,
+        model,
+        system,
+        shown,
+        frequency_range,
+        stability,
+        of_model=spectrum,
+        of_system=of_system if isinstance(of_system, Spectrum) else None,
+    )
     slow = tell_slow_modes(model, system, shown)
     return Examination(stability, (*step, *slow, *tell(found), *wires))
 

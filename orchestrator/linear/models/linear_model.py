@@ -4,7 +4,7 @@ z⁺ = F·z + G·w and w = H·z + K·w (ż for z⁺ where the model is continuou
 their way between components. The matrix A = F + G·(I − K)⁻¹·H that this comes down to is dense in large parts;
 the equations are not, which is what a search for a few eigenvalues of a large system lives on."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
@@ -110,12 +110,12 @@ class LinearModel:
 
     @cached_property
     def _is_unmoved(self) -> NDArray[np.bool_]:
-        own = self.F.diagonal()
-        others = sp.csr_array(self.F - sp.diags_array(own))
+        own = self._diagonal
         still: NDArray[np.bool_] = np.abs(own - 1.0) <= _STANDS
         stands = own == 0.0 if self.step_size is None else still
-        for matrix in (others, self.G):
-            stands &= np.asarray(abs(matrix).sum(axis=1)).ravel() == 0
+        rows, states = _rows_of(self.F), self.F.indices
+        stands[rows[(self.F.data != 0) & (states != rows)]] = False
+        stands[_rows_of(self.G)[self.G.data != 0]] = False
         return stands
 
     @property
@@ -133,7 +133,11 @@ class LinearModel:
     def settle(self) -> Callable[[Any], Any]:
         """W = (I − K)⁻¹·b."""
         m = self.K.shape[0]
-        return spla.splu(sp.csc_array(sp.eye_array(m) - self.K)).solve if m else lambda b: b
+        if not m:
+            return lambda b: b
+        factors = spla.splu(sp.csc_array(sp.eye_array(m, format="csr") - self.K))
+        solve: Callable[[Any], Any] = factors.solve
+        return solve
 
     def __getstate__(self) -> dict[str, Any]:
         """All but what is made anew where it is needed: a factorisation cannot be pickled or copied."""
@@ -220,10 +224,18 @@ class LinearModel:
         return self.hub.near_at(sigma) if self.is_searched_in_blocks else self.hub.at(sigma)
 
 
+def _rows_of(matrix: sp.csr_array) -> NDArray[np.intp]:
+    """The row in which each of a matrix's entries stands."""
+    return np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
+
+
 _ROWS = 64  # of a block that become sparse together: they stay in the processor's cache
+_FEW = 100_000  # numbers in blocks whose places are listed: of more, the list costs memory
 
 Indices = NDArray[np.int64]
 Places = NDArray[np.int32]
+
+_Part = tuple[Indices, Places, Matrix]  # of a sparse matrix: rows, columns and the block there
 
 
 class Equations:
@@ -232,9 +244,7 @@ class Equations:
     def __init__(self, n: int, m: int) -> None:
         self._shapes = {"F": (n, n), "G": (n, m), "H": (m, n), "K": (m, m)}
         self._states = np.arange(n)
-        self._parts: dict[str, list[tuple[Indices, Places, Matrix]]] = {
-            name: [] for name in self._shapes
-        }
+        self._parts: dict[str, list[_Part]] = {name: [] for name in self._shapes}
 
     def next_state(self, rows: slice, states: slice, A: Matrix, w: Indices, B: Matrix) -> None:
         """Add z⁺[rows] = A·z[states] + B·w[w]."""
@@ -274,22 +284,48 @@ class Equations:
 
     def _matrix(self, name: str) -> sp.csr_array:
         shape, parts = self._shapes[name], self._parts[name]
-        counts = np.zeros(shape[0], dtype=np.int64)
-        for rows, _, block in parts:
-            counts[rows] += np.count_nonzero(block, axis=1)
-        starts = np.concatenate([[0], np.cumsum(counts)])
-        columns, values = np.empty(starts[-1], dtype=np.int32), np.empty(starts[-1])
-        free = starts[:-1].copy()  # where the next number of each row goes
-        for rows, names, block in parts:
-            for first in range(0, len(rows), _ROWS):
-                own, some = rows[first : first + _ROWS], block[first : first + _ROWS]
-                row, column = np.nonzero(some)
-                before = np.searchsorted(row, np.arange(len(own)))
-                places = (free[own] - before)[row] + np.arange(len(row))
-                columns[places], values[places] = names[column], some[row, column]
-                free[own] += np.diff(before, append=len(row))
+        fill = _listed if sum(block.size for *_, block in parts) <= _FEW else _row_by_row
+        starts, columns, values = fill(shape[0], parts)
         if starts[-1] <= np.iinfo(np.int32).max:
             starts = starts.astype(np.int32)
         found = sp.csr_array((values, columns, starts), shape=shape)
         found.sum_duplicates()
         return found
+
+
+def _listed(rows: int, parts: Sequence[_Part]) -> tuple[Indices, Places, Vector]:
+    """Where each row of a sparse matrix starts, and its columns and values, from a list of all blocks' entries."""
+    if not parts:
+        return np.zeros(rows + 1, dtype=np.int64), np.empty(0, dtype=np.int32), np.empty(0)
+    found_rows: list[Indices] = []
+    found_columns: list[Places] = []
+    found_values: list[Vector] = []
+    for own, names, block in parts:
+        r, c = block.nonzero()
+        found_rows.append(own[r])
+        found_columns.append(names[c])
+        found_values.append(block[r, c])
+    row = np.concatenate(found_rows)
+    order = row.argsort(kind="stable")
+    columns, values = np.concatenate(found_columns)[order], np.concatenate(found_values)[order]
+    starts = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=rows))])
+    return starts, columns, values
+
+
+def _row_by_row(rows: int, parts: Sequence[_Part]) -> tuple[Indices, Places, Vector]:
+    """The same to the last bit for large blocks, of whose entries no list is made."""
+    counts = np.zeros(rows, dtype=np.int64)
+    for own, _, block in parts:
+        counts[own] += np.count_nonzero(block, axis=1)
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    columns, values = np.empty(starts[-1], dtype=np.int32), np.empty(starts[-1])
+    free = starts[:-1].copy()  # where the next number of each row goes
+    for every, names, block in parts:
+        for first in range(0, len(every), _ROWS):
+            own, some = every[first : first + _ROWS], block[first : first + _ROWS]
+            row, column = np.nonzero(some)
+            before = np.searchsorted(row, np.arange(len(own)))
+            places = (free[own] - before)[row] + np.arange(len(row))
+            columns[places], values[places] = names[column], some[row, column]
+            free[own] += np.diff(before, append=len(row))
+    return starts, columns, values

@@ -368,15 +368,17 @@ def check_loops(blocks: Blocks) -> None:
     Two components may tell each other values at once, if no output comes back to itself, as both stations of a DC line
     do. `check_feedthrough` forbids that, because a component of a run takes all its inputs before it gives outputs."""
     p = len(blocks.output_names)
-    graph, every = sp.lil_array((p, p), dtype=bool), np.arange(p)
+    every, ends = np.arange(p), [np.empty((2, 0), dtype=np.int64)]
     for name, c in blocks.components.items():
         direct, sources = c.D != 0, blocks.sources[name]
         direct[:, list(blocks.linked(name))] = False
         direct[:, sources >= p] = False
         rows, columns = np.nonzero(direct)
-        graph[every[blocks.window[name]][rows], sources[columns]] = True
-    of_itself = graph.diagonal() > 0
-    _, groups = connected_components(graph.tocsr(), directed=True, connection="strong")
+        ends.append(np.stack([every[blocks.window[name]][rows], sources[columns]]))
+    to, of = np.hstack(ends)
+    of_itself = np.isin(every, to[to == of])
+    graph = sp.csr_array((np.ones(len(to)), (to, of)), shape=(p, p))
+    _, groups = connected_components(graph, directed=True, connection="strong")
     looped = of_itself | (np.bincount(groups, minlength=p)[groups] > 1)
     caught = [name for name in blocks.components if looped[blocks.window[name]].any()]
     if caught:

@@ -5,6 +5,7 @@ from typing import TypeVar
 
 from orchestrator.devices.fmi.component import Component
 from orchestrator.devices.fmi.instance import is_ours
+from orchestrator.devices.fmi.port_mapping import without_binding
 from orchestrator.linear.models.component_linearization import ComponentLinearization
 from orchestrator.systems.coupling.master import Master
 
@@ -29,7 +30,7 @@ def remembered(
         return linearized()
     if len(store) >= _KEPT:
         store.clear()
-    if not keep_by_system(master, "ours", (component,), lambda: is_ours(description.path)):
+    if not is_ours_in(master, name):
         return linearized()
     names = (exchange.inputs.names, exchange.outputs.names)
     of = (description.path, description.guid, description.states)
@@ -38,6 +39,13 @@ def remembered(
         store[key] = linearized()
     found: ComponentLinearization = store[key]
     return found
+
+
+def is_ours_in(master: Master, name: str) -> bool:
+    """Return whether this machine's own toolchain built a running component's FMU, behind a binding or not."""
+    component = master.components[name]
+    path = without_binding(component.description).path
+    return keep_by_system(master, "ours", (component,), lambda: is_ours(path))
 
 
 def keep_by_system(

@@ -3,15 +3,19 @@ the parameter."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache, partial
+from typing import Self
 
 import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Vector
 from orchestrator.core.errors import AnalysisError
 from orchestrator.linear.models.linear_model import IDENTIFIED, LinearModel
 from orchestrator.linear.spectra.critical_modes import DENSE, nearest_pairs
 from orchestrator.linear.spectra.mode_tracking import similarity
-from orchestrator.linear.spectra.modes import Mode, eigenvectors, in_range
+from orchestrator.linear.spectra.modes import Mode, Spectrum, eigenvectors, in_range
 
 _SAME = 0.6  # least similarity with which two modes of neighbouring models count as the same mode
 _SHORTEST = 1 / 64  # length of the shortest stride, as a part of the path
@@ -58,8 +62,19 @@ def eigenpairs(
 ) -> tuple[list[Eigenpair], Vector]:
     """The eigenpairs of a frequency range [Hz], one of each conjugate pair, and all eigenvalues [rad/s]."""
     lambdas, left, right = eigenvectors(model)
+    return pairs_of(lambdas, left, right, lowest_hz, highest_hz), lambdas
+
+
+def pairs_of(
+    lambdas: Vector,
+    left: Vector,
+    right: Vector,
+    lowest_hz: float = 0.0,
+    highest_hz: float = np.inf,
+) -> list[Eigenpair]:
+    """The pairs of a frequency range [Hz] among eigenvalues [rad/s] with their eigenvectors as columns."""
     chosen = in_range(lambdas, lowest_hz, highest_hz)
-    return [_pair(complex(lambdas[k]), left[:, k], right[:, k]) for k in chosen], lambdas
+    return [_pair(complex(lambdas[k]), left[:, k], right[:, k]) for k in chosen]
 
 
 def pairs_near(model: LinearModel, wanted: complex) -> list[Eigenpair]:
@@ -67,6 +82,18 @@ def pairs_near(model: LinearModel, wanted: complex) -> list[Eigenpair]:
     if len(model.names) <= DENSE:
         return eigenpairs(model, 0.0, np.inf)[0]
     return [_pair(*found) for found in nearest_pairs(model, wanted, _NEIGHBOURS)]
+
+
+Near = Callable[[LinearModel, complex], Sequence[Eigenpair]]
+"""Gives a model's pairs near a point [rad/s]."""
+
+
+def near_with(known: LinearModel, spectrum: Spectrum) -> Near:
+    """Return `pairs_near`, which takes the pairs of one model from what is known of it."""
+    if spectrum.vectors is None or len(known.names) > DENSE:
+        return pairs_near
+    pairs = cache(partial(pairs_of, spectrum.eigenvalues, *spectrum.vectors))
+    return lambda model, wanted: pairs() if model is known else pairs_near(model, wanted)
 
 
 def pair_at(model: LinearModel, eigenvalue: complex) -> Eigenpair:
@@ -95,7 +122,7 @@ def follow_along(
     strides: Strides = USUAL,
     common: Sequence[str] = (),
     *,
-    near: Callable[[LinearModel, complex], Sequence[Eigenpair]] = pairs_near,
+    near: Near = pairs_near,
 ) -> Eigenpair:
     """Follow a mode along a path from ``begin`` to ``end``, in strides short enough to recognise it.
 
@@ -132,9 +159,17 @@ def between(one: LinearModel, other: LinearModel) -> Callable[[float], LinearMod
     if IDENTIFIED in {*one.sources.values(), *other.sources.values()}:
         return None
 
+    mixtures = [
+        _Mixture.of(a, b)
+        for a, b in zip(
+            (one.F, one.G, one.H, one.K), (other.F, other.G, other.H, other.K), strict=True
+        )
+    ]
+
     def model_at(part: float) -> LinearModel:
-        sides = zip((one.F, one.G, one.H, one.K), (other.F, other.G, other.H, other.K), strict=True)
-        F, G, H, K = ((1 - part) * a + part * b for a, b in sides)
+        if part == 1:
+            return other
+        F, G, H, K = (mixture.at(part) for mixture in mixtures)
         return LinearModel(
             F,
             G,
@@ -149,6 +184,43 @@ def between(one: LinearModel, other: LinearModel) -> Callable[[float], LinearMod
     return model_at
 
 
+@dataclass(frozen=True)
+class _Mixture:
+    """Two sparse matrices with their values in the same places, so that mixing them is mixing values."""
+
+    one: Vector
+    other: Vector
+    columns: NDArray[np.int32]
+    starts: NDArray[np.int32]
+    shape: tuple[int, int]
+
+    @classmethod
+    def of(cls, one: sp.csr_array, other: sp.csr_array) -> Self:
+        rows, columns = one.shape
+        width = max(1, columns)
+        keys = [
+            np.repeat(np.arange(rows) * width, np.diff(matrix.indptr)) + matrix.indices
+            for matrix in (one, other)
+        ]
+        places = np.union1d(*keys)
+        starts = np.searchsorted(places, np.arange(rows + 1) * width)
+        a, b = (
+            np.bincount(np.searchsorted(places, of), matrix.data, len(places))
+            for of, matrix in zip(keys, (one, other), strict=True)
+        )
+        return cls(
+            a,
+            b,
+            columns=(places % width).astype(np.int32),
+            starts=starts.astype(np.int32),
+            shape=(rows, columns),
+        )
+
+    def at(self, part: float) -> sp.csr_array:
+        mixed = (1 - part) * self.one + part * self.other
+        return sp.csr_array((mixed, self.columns, self.starts), shape=self.shape)
+
+
 def pair_of(mode: Mode, names: Sequence[str]) -> Eigenpair:
     return _pair(
         mode.eigenvalue, *(np.array([v[name] for name in names]) for v in (mode.left, mode.shape))
@@ -158,13 +230,16 @@ def pair_of(mode: Mode, names: Sequence[str]) -> Eigenpair:
 def _recognise(
     pair: Eigenpair, candidates: Sequence[Eigenpair], strides: Strides
 ) -> Eigenpair | None:
-    alike = [pair.similarity(candidate) for candidate in candidates]
-    order = np.argsort(alike)[::-1]
-    if not len(order) or not alike[order[0]] >= strides.same:
+    if not candidates:
+        return None
+    left, right = (np.array([getattr(c, side) for c in candidates]) for side in ("left", "right"))
+    (alike,) = similarity(pair.left[None], pair.right[None], left, right)
+    best = int(np.argmax(alike))
+    if not alike[best] >= strides.same:
         return None
     # above 1 it is half of a double eigenvalue
-    beside = max([alike[k] for k in order[1:]] + [alike[order[0]] - 1])
-    return candidates[order[0]] if beside <= strides.rival else None
+    beside = np.delete(alike, best).max(initial=alike[best] - 1)
+    return candidates[best] if beside <= strides.rival else None
 
 
 def _pair(eigenvalue: complex, left: Vector, right: Vector) -> Eigenpair:

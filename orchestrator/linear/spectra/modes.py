@@ -201,6 +201,8 @@ class Spectrum:
     modes: list[Mode]
     # the mode of the largest real part at any frequency, zeros left out; None if all eigenvalues are zeros
     rightmost: Mode | None
+    # left and right ones of all eigenvalues, as columns; None where they were not computed at once
+    vectors: tuple[Vector, Vector] | None = None
 
 
 def eigenvalues(model: LinearModel) -> NDArray[np.complex128]:
@@ -241,7 +243,7 @@ def find_spectrum(
 
     ``model``: step map or continuous matrix.
     ``lowest_hz`` and ``highest_hz``: range of Im λ/2π [Hz], both ends included; 0 includes real eigenvalues."""
-    lambdas, vectors = _values_and_vectors(model)
+    lambdas, vectors, every = _values_and_vectors(model)
     chosen, k = in_range(lambdas, lowest_hz, highest_hz), index_of_rightmost(lambdas)
     wanted = chosen if k is None else [*chosen, k]
     left, right = vectors(wanted)
@@ -249,20 +251,25 @@ def find_spectrum(
         make_mode(lambdas[i], left[:, j], right[:, j], model.names) for j, i in enumerate(wanted)
     ]
     rightmost = None if k is None else modes.pop()
-    return Spectrum(lambdas, least_damped_first(modes), rightmost)
+    return Spectrum(lambdas, least_damped_first(modes), rightmost, every)
 
 
 def _values_and_vectors(
     model: LinearModel,
-) -> tuple[NDArray[np.complex128], Callable[[Sequence[int]], tuple[Vector, Vector]]]:
-    """All eigenvalues [rad/s], and what gives the left and right eigenvectors of some of them, as columns."""
+) -> tuple[
+    NDArray[np.complex128],
+    Callable[[Sequence[int]], tuple[Vector, Vector]],
+    tuple[Vector, Vector] | None,
+]:
+    """All eigenvalues [rad/s], what gives the left and right eigenvectors of some of them, as columns, and all
+    eigenvectors where they are there already."""
     if len(model.names) <= ALL_VECTORS:
         lambdas, left, right = eigenvectors(model)
-        return lambdas, lambda chosen: (left[:, chosen], right[:, chosen])
+        return lambdas, lambda chosen: (left[:, chosen], right[:, chosen]), (left, right)
     form = RealSchur(model.A)
     lambdas, alive = to_continuous(form.values, model.step_size)
     places = np.flatnonzero(alive)
-    return lambdas, lambda chosen: form.vectors(places[chosen].tolist())
+    return lambdas, lambda chosen: form.vectors(places[chosen].tolist()), None
 
 
 def index_of_rightmost(values: NDArray[np.complex128]) -> int | None:

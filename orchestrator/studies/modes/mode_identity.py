@@ -56,18 +56,20 @@ def settle_names(
     *,
     undamped: Undamped | None = None,
     far: bool = True,
+    near: continuation.Near = continuation.pairs_near,
 ) -> NamedSystem:
     """A scenario's names, where shapes do not tell by following the mode that it was.
 
     ``known``: scenarios that are settled already, by name, with the values that hold for all.
     ``undamped``: gives it with other gains, where it still runs.
-    ``far``: whether to look beyond earlier scenarios where no mode would get a name."""
+    ``far``: whether to look beyond earlier scenarios where no mode would get a name.
+    ``near``: as `continuation.follow_along` takes it."""
     others = _Others(system, computed, known, undamped)
     for name in dict.fromkeys((*system.naming.contested, *system.naming.named)):
         contested = name in system.naming.contested
         origin = others.origin(name, contested=contested, far=far)
         if origin is not None:
-            system = replace(system, naming=_settle(name, system, origin))
+            system = replace(system, naming=_settle(name, system, origin, near))
         elif (
             (lost := others.lost) and name in system.naming.named and (contested or others.checked)
         ):
@@ -97,13 +99,13 @@ class _Origin:
     sure: bool
 
 
-def _settle(name: str, system: NamedSystem, origin: _Origin) -> Naming:
+def _settle(name: str, system: NamedSystem, origin: _Origin, near: continuation.Near) -> Naming:
     naming, modes, way, sure = system.naming, system.modes, origin.way, origin.sure
     best, measure = naming.fits[name]
     was = f"the mode of {_figures(origin.mode.eigenvalue)} {origin.place}"
     try:
         value = continuation.follow_along(
-            origin.start, way.model_at, 0.0, 1.0, way.strides, way.common
+            origin.start, way.model_at, 0.0, 1.0, way.strides, way.common, near=near
         ).eigenvalue
     except continuation.ModesMeetError as error:
         where = f"meets another one {error.beyond:.0%} of the way from there, at {_figures(error.eigenvalue)}"

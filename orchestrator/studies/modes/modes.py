@@ -36,6 +36,7 @@ from orchestrator.linear.models.periodic import model_of
 from orchestrator.linear.models.remembered import keep_by_system
 from orchestrator.linear.models.steady_state import OperatingPoint, find_operating_point
 from orchestrator.linear.spectra import modes as spectra
+from orchestrator.linear.spectra.continuation import Near, near_with, pairs_near
 from orchestrator.linear.spectra.critical_modes import find_critical_modes
 from orchestrator.linear.spectra.mode_names import Naming
 from orchestrator.linear.spectra.slowest_decay import LEAST_STATES, Decay, reduced, slowest_decay
@@ -61,6 +62,9 @@ _LEADING = 3
 
 SPARSE_BELOW = 0.2
 """Damping ratio below which a system too large for all its eigenvalues is searched where nobody asks for another."""
+
+# states up to which both spectra take less time than two threads to start
+_IN_TURN = 100
 
 BlackBoxes = Callable[[Master], Mapping[str, ComponentLinearization]]
 """Identifies components of a running system that hide their states."""
@@ -254,7 +258,7 @@ def modes_from(
 
 
 def _computed(system: "Linearised") -> ModesResult:
-    with side_by_side() as pool:
+    with side_by_side(pays=system.size > _IN_TURN) as pool:
         system.begin(pool)
     return system.finished()
 
@@ -291,6 +295,11 @@ class Linearised:
             self._said += (_too_large(states, frequency_range),)
         self.named: NamedSystem | None = None
         self._of_system: Future[spectra.Spectrum | Decay | None]
+
+    @property
+    def size(self) -> int:
+        """Number of states of the step map."""
+        return len(self._model.names)
 
     def begin(self, pool: Executor) -> None:
         if self._system is not None and LEAST_STATES <= len(self._system.names) <= WHOLE:
@@ -375,6 +384,7 @@ class Linearised:
                 directional=directional,
                 black_boxes=self._black_boxes,
                 master=self._master,
+                near=near_with(model, spectrum),
             )
             naming = self.named.naming
             named = {
@@ -474,12 +484,14 @@ def identified(
     directional: bool = False,
     black_boxes: BlackBoxes | None = None,
     master: Master | None = None,
+    near: Near = pairs_near,
 ) -> NamedSystem:
     """A linearised scenario with the names of its modes, by shape and where two fit by following.
 
     ``at_gains``: the linear model with other gains of damping controllers, where the scenario still runs.
     ``black_boxes``: identifies components of such a scenario that hide their states.
-    ``master``: what keeps spectra of models that come again."""
+    ``master``: what keeps spectra of models that come again.
+    ``near``: as `settle_names`."""
     first, last = _named_range(frequency_range)
 
     def name_system(
@@ -509,6 +521,7 @@ def identified(
         undamped=None
         if at_gains is None
         else lambda gains: name_system(prepared, point, at_gains(gains)),
+        near=near,
     )
 
 
