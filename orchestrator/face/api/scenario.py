@@ -279,11 +279,8 @@ class Scenario(Unchanged):
         question([replace(prepared, questions=_new(prepared.questions, set(self.questions)))])
         if self._bench is None:
             self._bench = PointBench(remember=True)
-        try:
-            return Modes(modes_at_point(prepared, self._bench.master(in_service(prepared)), seen))
-        except BaseException:
-            self.close()
-            raise
+        with self._bench.serving(in_service(prepared)) as master:
+            return Modes(modes_at_point(prepared, master, seen))
 
     @in_turn
     def close(self) -> None:

@@ -129,7 +129,7 @@ class Desk:
         # with its points' numbers
         self._prepared: tuple[str, ItemPreparation, dict[str, int]] | None = None
         # the next question's FMUs are those of the last one, where they can be and their files have not changed
-        self._bench, self._files = PointBench(), dict[Path, list[float]]()
+        self._bench, self._files = PointBench(remember=True), dict[Path, list[float]]()
 
     def answer(self, question: Mapping[str, Any], say: Say) -> dict[str, Any]:
         """Answer what is asked for under ``ask``: open, cell, parameters, modes, movers, slopes, first, response,
@@ -237,11 +237,8 @@ class Desk:
         if files != self._files:
             self._bench.close()
             self._files = files
-        try:
-            return Modes(modes_of(prepared, self._bench.master(in_service(prepared)), frequencies))
-        except BaseException:
-            self._bench.close()
-            raise
+        with self._bench.serving(in_service(prepared)) as master:
+            return Modes(modes_of(prepared, master, frequencies))
 
     def _modes(
         self,

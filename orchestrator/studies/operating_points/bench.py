@@ -1,12 +1,14 @@
 """FMUs that serve one operating point after the other, and the linear models that were made of them."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.closing import Closing
-from orchestrator.core.errors import ComponentError, few
+from orchestrator.core.errors import AnalysisError, ComponentError, InputError, few
 from orchestrator.devices.fmi.component import RealBatch
 from orchestrator.devices.fmi.instance import is_ours
 from orchestrator.linear.models.component_linearization import ComponentLinearization
@@ -66,6 +68,17 @@ class PointBench(Closing):
         self._master = running(prepared)
         self._master.remembered = self._remembered
         return self._master
+
+    @contextmanager
+    def serving(self, prepared: PreparedScenario) -> Iterator[Master]:
+        """The FMUs at a point. After an error they are closed, but where only the analysis has no result there: what a
+        failed FMU is worth after a reset is not known."""
+        try:
+            yield self.master(prepared)
+        except BaseException as error:
+            if not _is_of_analysis(error):
+                self.close()
+            raise
 
     def linearized(self, name: str) -> ComponentLinearization:
         """One component at the operating point; equal ones are perturbed once.
@@ -147,6 +160,16 @@ def without_references(c: Any) -> Any:
     """A converter's linear model without the references that damping controllers act on."""
     m = len(c.inputs) - (len(DRIVEN) if c.observed else 0)
     return replace(c, inputs=c.inputs[:m], B_c=c.B_c[:, :m], D=c.D[:, :m], observed=())
+
+
+def _is_of_analysis(error: BaseException) -> bool:
+    """Return whether an error says that there is no steady state, or no mode to believe, and that no FMU failed."""
+    if not isinstance(error, AnalysisError | InputError):
+        return False
+    cause: BaseException | None = error
+    while cause is not None and not isinstance(cause, ComponentError):
+        cause = cause.__cause__ or cause.__context__
+    return cause is None
 
 
 def _same_fmus(master: Master, prepared: PreparedScenario) -> bool:

@@ -361,12 +361,8 @@ def _started_anew(
     again: Again, at: _Mode, parameter: Parameter, *, directional: bool, bench: PointBench
 ) -> Callable[[float], Shift]:
     def shift(value: float) -> Shift:
-        master = bench.master(again({parameter.name: value}))
-        try:
+        with bench.serving(again({parameter.name: value})) as master:
             return at.shift(_started(master, directional=directional), master)
-        except BaseException:  # what a failed FMU is worth after a reset is not known
-            bench.close()
-            raise
 
     return shift
 

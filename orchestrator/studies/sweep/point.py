@@ -1,5 +1,8 @@
 """One point of a sweep: its task and its result."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 from functools import cache
 from multiprocessing.util import Finalize
@@ -14,6 +17,7 @@ from orchestrator.linear.spectra.mode_tracking import ModeSet
 from orchestrator.studies.black_box.coupled_modes import coupled_with_boxes
 from orchestrator.studies.modes.modes import ModesResult, compute_modes, modes_of
 from orchestrator.studies.operating_points.bench import PointBench
+from orchestrator.studies.points.executor import Executor, Serial
 from orchestrator.studies.points.failure import Failure
 from orchestrator.studies.points.processes import in_own_worker
 from orchestrator.studies.points.task import Kept, Task, computed
@@ -64,15 +68,29 @@ def _modes(task: SweepPointTask, case: Case) -> PointRecord:
 
 
 def _on_open_fmus(prepared: PreparedScenario, frequency_range: tuple[float, float]) -> ModesResult:
-    """`compute_modes` to the last bit, in a worker on the FMUs of its point before, where they can serve this one."""
-    if not in_own_worker():
+    """`compute_modes` to the last bit, on the FMUs of the point before where they stay open and can serve this one."""
+    bench = _bench_of_worker() if in_own_worker() else _bench_here.get()
+    if bench is None:
         return compute_modes(prepared, frequency_range)
-    bench = _bench_of_worker()
-    try:
-        return modes_of(prepared, bench.master(in_service(prepared)), frequency_range)
-    except BaseException:
-        bench.close()
-        raise
+    with bench.serving(in_service(prepared)) as master:
+        return modes_of(prepared, master, frequency_range)
+
+
+@contextmanager
+def fmus_kept_open(executor: Executor) -> Iterator[None]:
+    """Inside, the points that this process computes one after another stand on the same FMUs."""
+    if not isinstance(executor, Serial):
+        yield
+        return
+    with PointBench(remember=True) as bench:
+        before = _bench_here.set(bench)
+        try:
+            yield
+        finally:
+            _bench_here.reset(before)
+
+
+_bench_here: ContextVar[PointBench | None] = ContextVar("bench of this process", default=None)
 
 
 @cache

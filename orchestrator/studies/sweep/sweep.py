@@ -31,7 +31,12 @@ from orchestrator.studies.sweep.limit import (
     mode_behind,
     search,
 )
-from orchestrator.studies.sweep.point import PointRecord, SweepPointTask, compute_point
+from orchestrator.studies.sweep.point import (
+    PointRecord,
+    SweepPointTask,
+    compute_point,
+    fmus_kept_open,
+)
 from orchestrator.studies.sweep.request import SweepRequest
 from orchestrator.studies.sweep.trajectories import GridPlace, Trajectory, find_trajectories
 
@@ -224,6 +229,11 @@ def _check_end(plan: SweepPlan, varied: Mapping[str, Value]) -> list[Problem]:
 def run_sweep(plan: SweepPlan, work: Work) -> SweepResult:
     """Compute the points that are not stored yet, then follow the modes. Further points are added where a mode is not
     recognised."""
+    with fmus_kept_open(work.executor):
+        return _swept(plan, work)
+
+
+def _swept(plan: SweepPlan, work: Work) -> SweepResult:
     result = SweepResult(plan, [ScenarioSweep(prepared) for prepared in plan.scenarios])
     grid = list(grid_places(plan.axes))
     wanted: list[tuple[ScenarioSweep, GridPlace]] = [

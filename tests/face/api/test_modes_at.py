@@ -87,6 +87,19 @@ def test_a_wrong_value_leaves_the_scenario_usable(scenario):
     assert scenario.modes_at().stability.stable
 
 
+def test_where_there_is_no_steady_state_the_fmus_stay_open(case, scenario, opened):
+    """An optimiser tries such points; what it finds after them is what it would find without them."""
+    before = scenario.modes_at({"gfor.pod_p.K": 100.0})
+    with pytest.raises(gfor.CosimError, match="steady state"):
+        scenario.modes_at({"sg1.governor.delta_P_ref": 0.1})
+    for values in ({"gfor.pod_p.K": 100.0}, {"gfor.pod_p.K": 150.0}):
+        after, fresh = scenario.modes_at(values), case.scenario("pod_p", values).modes()
+        assert np.array_equal(after.eigenvalues, fresh.eigenvalues)
+        assert np.array_equal(after.result.model.A, fresh.result.model.A)
+    assert np.array_equal(before.eigenvalues, scenario.modes_at({"gfor.pod_p.K": 100}).eigenvalues)
+    assert len(opened) == 3 * len(scenario.prepared.system.components)
+
+
 def test_copies_have_no_open_fmus(scenario):
     whole = scenario.modes_at()
     for other in (copy.deepcopy(scenario), pickle.loads(pickle.dumps(scenario))):

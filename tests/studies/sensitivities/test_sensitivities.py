@@ -10,7 +10,7 @@ from fmus.toolchain.exporter import cached
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.python_fmu import PythonFmu
 from fmus.toolchain.symbols import fabs, fmin, sin
-from orchestrator.core.errors import AnalysisError
+from orchestrator.core.errors import AnalysisError, ComponentError
 from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.studies.modes.modes import running
 from orchestrator.studies.operating_points import bench
@@ -154,7 +154,16 @@ def test_a_fixed_parameter_is_taken_where_it_is_asked_for(tmp_path):
     assert "fixed" in held.reason
 
 
-def test_fmus_are_opened_once_and_again_only_after_a_failure(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("error", "more", "says"),
+    [
+        (AnalysisError("it swings"), 1, "no steady state"),
+        (ComponentError("osc", "fmi2DoStep", "it fails", ""), 2, "it fails"),
+    ],
+)
+def test_fmus_are_opened_once_and_again_only_after_one_failed(
+    error, more, says, tmp_path, monkeypatch
+):
     """A start without a steady state leaves nothing behind: the rows after it are those of a study without it."""
     scenario = scenario_of(tmp_path, oscillator())
     asked = ["osc.fixed", "osc.offset", "osc.roof"]
@@ -166,15 +175,15 @@ def test_fmus_are_opened_once_and_again_only_after_a_failure(tmp_path, monkeypat
     def fails_once(master):
         starts.append(master)
         if len(starts) == 2:
-            raise AnalysisError("it swings")
+            raise error
         return find_operating_point(master)
 
     starts = []
     monkeypatch.setattr(sensitivities, "find_operating_point", fails_once)
     rows = rows_of(scenario.sensitivities(parameters=asked))
-    assert len(opened) == 3
+    assert len(opened) == 1 + more
     (failed,) = (name for name, row in rows.items() if row.derivative is None)
-    assert "no steady state" in rows[failed].reason
+    assert says in rows[failed].reason
     others = whole.keys() - {failed}
     assert {n: rows[n].derivative for n in others} == {n: whole[n].derivative for n in others}
 

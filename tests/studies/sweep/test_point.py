@@ -8,12 +8,14 @@ import pytest
 from orchestrator.cases.case import load_case
 from orchestrator.core.errors import ErrorKind
 from orchestrator.studies.operating_points import bench
+from orchestrator.studies.points.executor import Serial
+from orchestrator.studies.points.points import Work
 from orchestrator.studies.points.store import PointStore
 from orchestrator.studies.sweep import point
 from orchestrator.studies.sweep.axes import parse_vary
 from orchestrator.studies.sweep.point import PointRecord, compute_point
 from orchestrator.studies.sweep.request import SweepRequest
-from orchestrator.studies.sweep.sweep import plan_sweep
+from orchestrator.studies.sweep.sweep import plan_sweep, run_sweep
 from tests.studies.sweep.sweep_case import two_oscillators
 
 
@@ -125,3 +127,24 @@ def test_points_of_a_worker_share_fmus_and_are_those_of_fresh_ones_to_the_last_b
             assert one.modes.right.tobytes() == other.modes.right.tobytes()
     assert sum(record.modes is None for record in together) == 3
     assert len(opened) == 4  # the first, and after each that fails
+
+
+def test_a_sweep_in_this_process_stands_on_the_same_fmus_and_closes_them(tmp_path, monkeypatch):
+    axes = [parse_vary("a1.gain=3:4:3")]
+    plan = plan_sweep(load_case(two_oscillators(tmp_path)), SweepRequest(axes))
+    alone = [compute_point(plan.task(plan.scenarios[0], (k,))) for k in range(3)]
+    opened, fresh = [], bench.running
+
+    def counted(prepared):
+        opened.append(fresh(prepared))
+        return opened[-1]
+
+    monkeypatch.setattr(bench, "running", counted)
+    swept, *_ = run_sweep(plan, Work(Serial())).scenarios
+    for k, one in enumerate(alone):
+        together = swept.points[(k,)].modes
+        assert together.eigenvalues.tobytes() == one.modes.eigenvalues.tobytes()
+        assert together.right.tobytes() == one.modes.right.tobytes()
+    (master,) = opened
+    assert all(component._fmu is None for component in master.components.values())
+    assert point._bench_here.get() is None
