@@ -191,8 +191,11 @@ def _imported(
 ) -> ModuleType:
     """In the place of Python's ``__import__``, as long as an FMU with modules is loaded."""
     top = (str((globals or {}).get("__package__") or "") if level else name).partition(".")[0]
+    own_first = [one for one in _living.values() if one.may_stand_first(top)]
+    if not own_first:  # so it is at each call into an FMU, which imports NumPy again
+        return _import(name, globals, locals, fromlist or (), level)
     with ExitStack() as views:
-        for brought in [one for one in _living.values() if one.may_stand_first(top)]:
+        for brought in own_first:
             own = brought.offers(top) and brought.holds((globals or {}).get("__file__"))
             if brought.offers(top) and _by_its_binary(brought, globals):
                 brought.show(top)

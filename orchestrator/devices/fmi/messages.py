@@ -3,7 +3,7 @@
 import ctypes
 import itertools
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection
 from typing import Any
 from weakref import WeakValueDictionary
 
@@ -25,8 +25,10 @@ class Messages(list[tuple[int, str]]):
         self.streak = self.step = 0
 
 
-def texts(messages: Iterable[tuple[int, str]], least: int = 0) -> list[str]:
+def texts(messages: Collection[tuple[int, str]], least: int = 0) -> list[str]:
     """Distinct messages of at least that status, in order, oldest first."""
+    if not messages:  # as after nearly every call
+        return []
     return list(dict.fromkeys(text for status, text in messages if status >= least))
 
 
