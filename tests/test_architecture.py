@@ -282,13 +282,15 @@ FOR_TYPES = {
     "systems.coupling.observers",
     "studies.oscillations.signs",
     "studies.oscillations.view",
+    "studies.runs.tables",
+    "studies.sensitivities.view",
     "output.report.plot_style",
     "output.report.fmu_variables",
     "output.results.recording_writer",
     "output.results.file_writers",
 }
-"""Imported by `signal compare`, `gfor verify` and `load`, which start without what computes; `imports` counts these
-arrows."""
+"""Imported by `signal compare`, `gfor verify` and `load`, which start without what computes, and by `modes`, which
+starts without runs and sensitivities; `imports` counts these arrows."""
 
 
 LATE = {"pandas", "scipy.interpolate", "scipy.optimize", "scipy.signal", "scipy.stats", "xarray"}

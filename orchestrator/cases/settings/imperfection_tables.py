@@ -112,7 +112,7 @@ def _overridden(
 
 @cache
 def _adapter() -> TypeAdapter[schema.ImperfectionTable]:
-    """What validates a table; it takes a millisecond to make."""
+    """Return the validator of a table, which takes a millisecond to make."""
     return TypeAdapter(schema.ImperfectionTable)
 
 

@@ -19,17 +19,20 @@ from orchestrator.linear.signals.identification import IdentifiedMode
 from orchestrator.linear.spectra.modes import ZERO, Mode, eigenvalues
 from orchestrator.output.report.notebook import Axes, axes_or_new, curves_on, headline, page
 from orchestrator.output.results.staging import ScenarioFolder, new_run_id, staged
-from orchestrator.studies.oscillations.view import Sources, sources_of
-from orchestrator.studies.signals.comparison import recorded
 
 if TYPE_CHECKING:
     from orchestrator.linear.spectra.stability import Stability
     from orchestrator.simulation.watch.finding import Finding
     from orchestrator.studies.modes.modes import ModesResult
+    from orchestrator.studies.oscillations import view as oscillations
+    from orchestrator.studies.oscillations.view import Sources
     from orchestrator.studies.runs import answer_of_run
     from orchestrator.studies.runs.run import RunResult
-else:  # what computes, which a recording is read without
+    from orchestrator.studies.signals import comparison
+else:  # what computes, which a recording is read without, and of a run what modes need not
     answer_of_run = Late("orchestrator.studies.runs.answer_of_run")
+    comparison = Late("orchestrator.studies.signals.comparison")
+    oscillations = Late("orchestrator.studies.oscillations.view")
 
 _OF_EACH = (
     "eigenvalue",
@@ -368,7 +371,7 @@ class Run(NoTruth):
         InputError
             If it was not recorded.
         """
-        return recorded(self.dataset, expression, self.result.modes.prepared.name)
+        return comparison.recorded(self.dataset, expression, self.result.modes.prepared.name)
 
     def table(self) -> pd.DataFrame:
         """All recorded signals over the time [s]."""
@@ -383,7 +386,7 @@ class Run(NoTruth):
             The part of the run that is used [s]; by default all of it.
         """
         label = str(self.dataset.attrs.get("scenario", "run"))
-        return sources_of(self.dataset, label, start, stop, self.result.modes.prepared)
+        return oscillations.sources_of(self.dataset, label, start, stop, self.result.modes.prepared)
 
     def summary(self) -> dict[str, Any]:
         """The same as ``gfor run --json`` prints of this scenario, as JSON's types."""

@@ -284,7 +284,7 @@ class Equations:
 
     def _matrix(self, name: str) -> sp.csr_array:
         shape, parts = self._shapes[name], self._parts[name]
-        fill = _listed if sum(block.size for *_, block in parts) <= _FEW else _row_by_row
+        fill = _from_list if sum(block.size for *_, block in parts) <= _FEW else _row_by_row
         starts, columns, values = fill(shape[0], parts)
         if starts[-1] <= np.iinfo(np.int32).max:
             starts = starts.astype(np.int32)
@@ -293,7 +293,7 @@ class Equations:
         return found
 
 
-def _listed(rows: int, parts: Sequence[_Part]) -> tuple[Indices, Places, Vector]:
+def _from_list(rows: int, parts: Sequence[_Part]) -> tuple[Indices, Places, Vector]:
     """Where each row of a sparse matrix starts, and its columns and values, from a list of all blocks' entries."""
     if not parts:
         return np.zeros(rows + 1, dtype=np.int64), np.empty(0, dtype=np.int32), np.empty(0)

@@ -1,8 +1,10 @@
 """Tables of modes and runs for a terminal."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
@@ -16,7 +18,9 @@ from orchestrator.output.report.terminal_tables import make_table
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.output.results.signals import relative_difference, signal
 from orchestrator.studies.modes.modes import ModesResult, named_json
-from orchestrator.studies.runs.run import RunResult
+
+if TYPE_CHECKING:  # modes have tables as well, and need no run
+    from orchestrator.studies.runs.run import RunResult
 
 
 def steady_states(results: Sequence[ModesResult]) -> Table:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder
@@ -13,7 +13,9 @@ from orchestrator.output.report.notebook import page
 from orchestrator.output.results.file_writers import save_json, save_table
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.output.results.staging import new_run_id, staged
-from orchestrator.studies.sensitivities.sensitivities import Sensitivity, SensitivityResult
+
+if TYPE_CHECKING:  # a scenario knows what it may be asked for, and need not compute it
+    from orchestrator.studies.sensitivities.sensitivities import Sensitivity, SensitivityResult
 
 
 class Sensitivities:
