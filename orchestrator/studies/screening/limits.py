@@ -12,6 +12,10 @@ from orchestrator.studies.screening.summary import Summary, where
 
 _FEW = 3
 
+_FAR_BEYOND = 3.0
+"""Part of a rating that no branch of an intact network carries for good. MultiGen of PowerSystemsTestData has 250 MVA
+for each line and 4700 MW between two of its buses: 12.5 times as much."""
+
 
 def worst_branch(item: ScreenedItem) -> Loading | None:
     """The branch that is loaded most; None where the file has no ratings."""
@@ -136,7 +140,23 @@ def _branches_in_words(summary: Summary) -> str:
             len(already) > _FEW
         )
         text += f" Beyond it without an outage already: {shown}."
-    return text
+    return text + _far_beyond(summary)
+
+
+def _far_beyond(summary: Summary) -> str:
+    """Ask whether ratings are meant that the intact network exceeds many times; "" where none is."""
+    intact = [item for item in summary.result.items if not item.outage.elements]
+    found = [one for item in intact for one in item.record.loadings if one.part > _FAR_BEYOND]
+    if not found:
+        return ""
+    worst = max(found, key=lambda one: one.part)
+    rating = summary.result.plan.prepared.file_limits.ratings[worst.branch].mva
+    number = len({one.branch for one in found})
+    others = f" and {number - 1} more" if number > 1 else ""
+    return (
+        f" Are its ratings meant? The file gives {worst.branch} {rating:g} MVA, and the intact network takes "
+        f"{100 * worst.part:.4g} % of it{others}."
+    )
 
 
 def _voltages_in_words(summary: Summary) -> str:

@@ -1,5 +1,6 @@
 """Ratings and voltage bands of a RAW file beside the power flow after an outage."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -115,6 +116,27 @@ def test_a_screening_says_what_is_beyond_and_what_was_before(tmp_path):
     after = limits_json(summary)["items"][1]
     before = {one["branch"]: one["beyond_in_intact_network"] for one in after["branches"]}
     assert set(before.values()) == {True, False}
+
+
+@pytest.mark.parametrize(("times", "asked"), [(1.0, False), (0.25, True)])
+def test_ratings_that_the_intact_network_exceeds_many_times_are_asked_about(times, asked, tmp_path):
+    """A quarter of the first rating of one line: 4 times what it carried by the independent calculation."""
+    summary = screened(tmp_path)
+    intact = summary.result.items[0]
+    voltages = summary.result.plan.prepared.power_flow.voltages
+    wanted = independent_loadings({n: voltages[f"bus_{n}"] for n in range(1, 10)})
+    worst = max(wanted, key=wanted.get)
+    limits = summary.result.plan.prepared.file_limits
+    small = replace(limits.ratings[worst], mva=times * limits.ratings[worst].mva)
+    limits = replace(limits, ratings={**limits.ratings, worst: small})
+    flow = summary.result.plan.prepared.power_flow
+    intact.record = replace(intact.record, loadings=loadings(flow, limits))
+    summary.result.plan.prepared = SimpleNamespace(file_limits=limits)
+    said = limits_sentence(summary)
+    figure = f"The file gives {worst} {small.mva:g} MVA, and the intact network takes "
+    figure += f"{100 * wanted[worst] / times:.4g} % of it."
+    assert (figure in said) == asked
+    assert ("Are its ratings meant?" in said) == asked
 
 
 def test_nothing_is_said_to_hold_where_there_is_no_power_flow(tmp_path):
