@@ -152,7 +152,7 @@ def _far_beyond(summary: Summary) -> str:
     worst = max(found, key=lambda one: one.part)
     rating = summary.result.plan.prepared.file_limits.ratings[worst.branch].mva
     number = len({one.branch for one in found})
-    others = f" and {number - 1} more" if number > 1 else ""
+    others = f"; {number - 1} more are alike" if number > 1 else ""
     return (
         f" Are its ratings meant? The file gives {worst.branch} {rating:g} MVA, and the intact network takes "
         f"{100 * worst.part:.4g} % of it{others}."
