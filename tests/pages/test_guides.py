@@ -24,14 +24,14 @@ HEAVY = (
     "how-to/black-box",
     "how-to/write-a-controller-dll",
     "how-to/several-vendors",
+    "how-to/scan-and-fmu",
+    "how-to/grid-forming-among-grid-following",
+    "how-to/faults-and-outages",
 )
 """Executed by night."""
 
 ANYWHERE = (
     "first-steps",
-    "how-to/scan-and-fmu",
-    "how-to/grid-forming-among-grid-following",
-    "how-to/faults-and-outages",
     "how-to/own-network",
     "how-to/audit-a-study",
     "how-to/sign-a-certificate",

@@ -241,7 +241,7 @@ def test_what_is_read_while_it_is_written_and_after_a_kill(tmp_path):
     """A second process reads while the first writes; the first is killed at moments that chance chooses."""
     chance, rows, lengths = np.random.default_rng(5), Rows(200_000), []
     command = [sys.executable, "-c", WRITER.format(root=str(Path(__file__).parents[3]))]
-    for number in range(15):
+    for number in range(8):
         folder = tmp_path / str(number) / "recording"
         with subprocess.Popen([*command, str(folder)], stdout=subprocess.PIPE) as writer:
             assert writer.stdout.readline() == b"begin\n"
