@@ -280,6 +280,42 @@ def test_a_search_goes_on_where_little_is_left_of_its_cell(share, least, in_bloc
 
 
 @pytest.mark.parametrize(
+    ("shares", "looks"),
+    [
+        ([0.2, 0.2], 2),
+        ([0.2, 0.15], 2),
+        ([0.15, 0.2, 0.2], 3),  # it has grown
+        ([0.05] * 4, 4),  # too little of the cell
+        ([0.2, None, 0.2], 3),
+        ([0.75, 0.75, 1.0], 3),  # nearly all: the rest is waited for
+    ],
+)
+def test_a_crowd_that_more_vectors_did_not_show_is_not_waited_for(
+    shares, looks, in_blocks, monkeypatch
+):
+    cell, seen = RegionCell(4.0, 6.0, -0.1, 0.1), []
+    search = Search(model(complex(-0.2, 5.0)), 5j)
+    search.reach = 0.5
+
+    def part(blocks, *_):
+        blocks._done = critical_modes._ENOUGH
+        share = shares[len(seen)]
+        seen.append(share)
+        high = 4.0 * (6.0 / 4.0) ** (share or 0.0)
+        return cell if share == 1.0 else replace(cell, high=high) if share else None
+
+    monkeypatch.setattr(search, "_known_part", part)
+    monkeypatch.setattr(critical_modes, "_grow", looking)
+    search.covering(cell, 2.0)
+    assert len(seen) == looks
+
+
+def looking(blocks, enough):
+    """Look again and again, without more vectors, at most four times."""
+    return any(enough(blocks) for _ in range(4))
+
+
+@pytest.mark.parametrize(
     ("high", "vectors", "ratio"),
     [(3.0, 40, 1.8), (3.0, 112, 1.5), (3.0, 176, 1.25), (2.1, 220, 1.2), (9.0, 40, 2.5)],
 )
