@@ -275,6 +275,9 @@ class SomeRows(Protocol):
 
     def __getitem__(self, rows: slice, /) -> Matrix: ...
 
+    def take(self, columns: Places, axis: int, /) -> "SomeRows":
+        """Some of its columns, for which ``axis`` is 1."""
+
 
 def divide(
     T: Matrix, R: SomeRows, scale: Vector, at_rest: NDArray[np.bool_], owner: Places, taker: Places
@@ -325,19 +328,27 @@ def _in_common(R: SomeRows, scale: Vector, taker: Places) -> tuple[Matrix, sp.cs
     weights = np.random.default_rng(0).standard_normal((tried, len(R))) / np.sqrt(tried) / scale
     parts = [slice(begin, begin + _ROWS) for begin in range(0, len(R), _ROWS)]
     answers = sum((weights[:, part] @ R[part] for part in parts), np.zeros((tried, len(taker))))
-    said = [_rows_of(answers[:, group], len(R)) for group in groups]
-    by_group = sp.block_diag(said, format="csr")
-    common = by_group[:, np.argsort(order)]
-    L = np.empty((len(R), common.shape[0]))
-    for part in parts:
-        L[part] = (common @ R[part].T).T
-    return L, common, np.repeat(taker[[group[0] for group in groups]], list(map(len, said)))
+    found = [_told_by_some(answers[:, group], len(R)) for group in groups]
+    L = R.take(
+        np.concatenate([group[few] for group, (few, _) in zip(groups, found, strict=True)]), 1
+    )
+    common = sp.block_diag([parts for _, parts in found], format="csr")[:, np.argsort(order)]
+    owners = taker[[group[0] for group in groups]]
+    return L[:], common, np.repeat(owners, [len(few) for few, _ in found])
 
 
-def _rows_of(answers: Matrix, rows: int) -> Matrix:
-    """Directions, as rows, in which some columns answer; the others are as small as ties that are left out."""
-    _, sizes, right = np.linalg.svd(answers, full_matrices=False)
-    return np.asarray(right[sizes > _NEGLIGIBLE * np.sqrt(rows)])
+def _told_by_some(answers: Matrix, rows: int) -> tuple[Places, Matrix]:
+    """Return a few of some columns, and all of them as sums of these, shape (few, columns).
+
+    What is left over is as small as ties that are left out."""
+    _, triangle, order = scipy.linalg.qr(answers, mode="economic", pivoting=True)
+    count = int((np.abs(triangle.diagonal()) > _NEGLIGIBLE * np.sqrt(rows)).sum())
+    parts = np.empty((count, len(order)))
+    parts[:, order[:count]] = np.eye(count)
+    parts[:, order[count:]] = scipy.linalg.solve_triangular(
+        triangle[:count, :count], triangle[:count, count:]
+    )
+    return order[:count], parts
 
 
 def _in_order(matrix: Matrix, rows: Places, columns: Places) -> Matrix:
@@ -378,19 +389,25 @@ class _Builder:
             answers = sum(m @ turns for m, turns in zip((T, R), tried, strict=True)) / scale
             basis = np.linalg.qr(answers)[0]
             across = (basis / scale).T
-            u, sizes, right = scipy.linalg.svd(
-                np.hstack([across @ T, across @ R]), full_matrices=False, check_finite=False
-            )
+            along = np.hstack([across @ T, across @ R])
+            u, sizes = _left_singular(along)
             rank = int((sizes > least).sum())
             if rank <= count - _SPARE:
                 break
             if 2 * count >= min(T.shape):
                 return None
             count *= 2
-        right = right[:rank] * sizes[:rank, None]
+        right = u[:, :rank].T @ along
         left = scale * (basis @ u[:, :rank])
         cut = T.shape[1]
         return _Tie(left, right[:, :cut].copy(), right[:, cut:].copy())
+
+
+def _left_singular(along: Matrix) -> tuple[Matrix, Vector]:
+    """Return the left singular vectors and the singular values of a matrix of few rows and many columns."""
+    square = scipy.linalg.qr(along.T, mode="r", check_finite=False)[0][: len(along)].T
+    u, sizes, _ = scipy.linalg.svd(square, full_matrices=False, check_finite=False)
+    return u, sizes
 
 
 def _nearness(T: Matrix, R: Matrix, owner: Places, taker: Places) -> Matrix:
@@ -436,8 +453,8 @@ def _cut(near: Matrix, groups: Places, sizes: Places) -> tuple[Places, Places]:
     """Cut where the groups tell each other least: along the second eigenvector of what they tell, by their own sums.
 
     Far groups tell each other little and not nothing; a fourth root makes them count, and the cut follows the
-    network."""
-    tell = near[np.ix_(groups, groups)]
+    network. Six digits are enough for where it runs."""
+    tell = near[np.ix_(groups, groups)].astype(np.float32)
     tell = np.sqrt(np.sqrt(tell + tell.T))
     np.fill_diagonal(tell, 0.0)
     sums = tell.sum(axis=1)
@@ -445,7 +462,7 @@ def _cut(near: Matrix, groups: Places, sizes: Places) -> tuple[Places, Places]:
     root = np.sqrt(sums)
     first = root / np.linalg.norm(root)
     tell /= root[:, None] * root
-    along = np.random.default_rng(0).standard_normal(len(groups))
+    along = np.random.default_rng(0).standard_normal(len(groups)).astype(np.float32)
     for _ in range(_TURNS):
         along -= first * (first @ along)
         along += tell @ along

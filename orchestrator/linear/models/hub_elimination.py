@@ -120,6 +120,10 @@ class _DenseRows:
             numbers[places] = 0.0
         return found
 
+    def take(self, columns: Places, _: int) -> "_DenseRows":
+        """See `SomeRows.take`."""
+        return replace(self, columns=self.columns[columns])
+
 
 @dataclass(frozen=True)
 class HubEquations:
