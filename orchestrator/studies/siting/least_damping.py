@@ -5,7 +5,7 @@ form of the system without the controller's component, and are computed from the
 chosen. In a very large one the swings are followed from setting to setting, which says what grows among them, and
 nothing of what grows elsewhere: all eigenvalues are computed with those settings that decide."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -53,6 +53,72 @@ _NEIGHBOURS = 8  # pairs among which a mode is recognised
 _ALIKE = 1e-6  # the least damped mode in both ways differs by at most this part of its size
 
 
+class _OneForm:
+    """All eigenvalues by setting, from one Schur form of the system without the controller's component.
+
+    ``forget``: is told of which settings the eigenvalues hold no longer, once the form has failed. From then on it
+    serves none."""
+
+    def __init__(self, loop: PodLoop, forget: Callable[[Iterable[PodSetting]], None]) -> None:
+        self._loop, self._forget = loop, forget
+        self._found: dict[PodSetting, ChangedSpectrum] = {}
+        self._changes: ChangedSpectra | None = None
+        # a pair from which others are followed, and the same in the coordinates of the form's modes
+        self._start: tuple[Eigenpair, Eigenpair] | None = None
+        self._has_failed = False
+
+    def __contains__(self, setting: PodSetting) -> bool:
+        return setting in self._found
+
+    def at(self, setting: PodSetting) -> ChangedSpectrum | None:
+        """All eigenvalues with a setting; None where that is not worthwhile, or fails."""
+        if setting in self._found:
+            return self._found[setting]
+        off = self._loop.model(PodSetting(0.0, NO_COMPENSATION))
+        within = LEAST_CHANGED <= len(off.names) <= MOST_WHOLE
+        if self._has_failed or not (within and setting.gain):
+            return None
+        model = self._loop.model(setting)
+        with suppress(AnalysisError, np.linalg.LinAlgError):
+            if self._changes is None:
+                self._changes = ChangedSpectra(off, model)
+            self._found[setting] = self._changes.of(model)
+            return self._found[setting]
+        self.fail()
+        return None
+
+    def followed(self, start: Placed, setting: PodSetting) -> complex | None:
+        """The mode of a start with a gain of 0 where it is with another setting [rad/s]; None where `at` is None.
+
+        Raises `AnalysisError` where it cannot be followed."""
+        if self.at(setting) is None or self._changes is None:
+            return None
+        latest = setting
+
+        def model_at(gain: float) -> LinearModel:
+            nonlocal latest
+            latest = replace(setting, gain=gain)
+            return self._loop.model(latest)
+
+        def near(model: LinearModel, wanted: complex) -> Sequence[Eigenpair]:
+            changed = self.at(latest)
+            if changed is None:
+                raise AnalysisError(f"with a gain of {latest.gain:g} the system has other modes")
+            return changed.pairs_near(wanted, _NEIGHBOURS)
+
+        if self._start is None or self._start[0] is not start.pair:
+            self._start = start.pair, self._changes.seen(start.pair)
+        return follow_along(self._start[1], model_at, 0.0, setting.gain, near=near).eigenvalue
+
+    def fail(self) -> None:
+        """Forget what the form gave, and serve none any more."""
+        self._forget(self._found)
+        self._found.clear()
+        self._changes = None
+        self._start = None
+        self._has_failed = True
+
+
 class LeastDamping:
     """Least damping ratios by setting.
 
@@ -74,11 +140,7 @@ class LeastDamping:
         self._spectra: dict[
             PodSetting, Spectrum
         ] = {}  # with the swings, of settings that were proved
-        self._changed: dict[PodSetting, ChangedSpectrum] = {}
-        self._changes: ChangedSpectra | None = None
-        # a pair from which others are followed, and the same in the coordinates of the one form's modes
-        self._start: tuple[Eigenpair, Eigenpair] | None = None
-        self._is_changing = True  # whether one Schur form may serve all settings
+        self._form = _OneForm(loop, self._forget)
 
     def of(self, setting: PodSetting) -> float:
         """The least damping ratio, `GROWS` where something is seen to grow.
@@ -103,9 +165,9 @@ class LeastDamping:
     def weakest(self, setting: PodSetting) -> complex | None:
         """The least damped mode [rad/s], by all eigenvalues; None where something grows."""
         if setting not in self._whole:
-            changed = self._changed_to(setting)
-            if changed is not None:
-                return self._weakest_of(changed.values)
+            by_form = self._form.at(setting)
+            if by_form is not None:
+                return self._weakest_of(by_form.values)
         return self._weakest_of(self.all_values(setting))
 
     def _weakest_of(self, values: NDArray[np.complex128]) -> complex | None:
@@ -115,78 +177,43 @@ class LeastDamping:
 
     def is_sure(self, setting: PodSetting) -> bool:
         """Tell whether growth at any frequency is known, or that something grows."""
-        known = setting in self._whole or setting in self._changed
+        known = setting in self._whole or setting in self._form
         return known or self._found.get(setting) == GROWS
 
     def is_proved(self, setting: PodSetting) -> bool:
         """Compute all eigenvalues from the whole matrix, and compare them with those by one form for all settings.
 
         Where they differ, nothing of that form is used any more, and what was found by it is forgotten."""
-        by_changes = self._changed.get(setting)
-        if by_changes is None:
+        by_form = self._form.at(setting) if setting in self._form else None
+        if by_form is None:
             return True
-        one, other = self._weakest_of(by_changes.values), self._weakest_of(self.all_values(setting))
+        one, other = self._weakest_of(by_form.values), self._weakest_of(self.all_values(setting))
         if one == other or (
             one is not None and other is not None and abs(one - other) <= _ALIKE * abs(other)
         ):
             return True
-        self._forget_changes()
+        self._form.fail()
         return False
 
     def followed(self, start: Placed, setting: PodSetting) -> complex:
         """The mode of a start with a gain of 0 where it is with another setting [rad/s].
 
         Raises `AnalysisError` where it cannot be followed."""
-        if self._changed_to(setting) is None or self._changes is None:
-            return self._loop.place(start, setting.gain, setting.filters).eigenvalue
-        latest = setting
+        by_form = self._form.followed(start, setting)
+        if by_form is not None:
+            return by_form
+        return self._loop.place(start, setting.gain, setting.filters).eigenvalue
 
-        def model_at(gain: float) -> LinearModel:
-            nonlocal latest
-            latest = replace(setting, gain=gain)
-            return self._loop.model(latest)
-
-        def near(model: LinearModel, wanted: complex) -> Sequence[Eigenpair]:
-            changed = self._changed_to(latest)
-            if changed is None:
-                raise AnalysisError(f"with a gain of {latest.gain:g} the system has other modes")
-            return changed.pairs_near(wanted, _NEIGHBOURS)
-
-        if self._start is None or self._start[0] is not start.pair:
-            self._start = start.pair, self._changes.seen(start.pair)
-        return follow_along(self._start[1], model_at, 0.0, setting.gain, near=near).eigenvalue
-
-    def _changed_to(self, setting: PodSetting) -> ChangedSpectrum | None:
-        """All eigenvalues with a setting by one Schur form for all; None where that is not worthwhile, or fails."""
-        if setting in self._changed:
-            return self._changed[setting]
-        off = self._loop.model(PodSetting(0.0, NO_COMPENSATION))
-        within = LEAST_CHANGED <= len(off.names) <= MOST_WHOLE
-        if not (self._is_changing and within and setting.gain):
-            return None
-        model = self._loop.model(setting)
-        with suppress(AnalysisError, np.linalg.LinAlgError):
-            if self._changes is None:
-                self._changes = ChangedSpectra(off, model)
-            self._changed[setting] = self._changes.of(model)
-            return self._changed[setting]
-        self._forget_changes()
-        return None
-
-    def _forget_changes(self) -> None:
-        for setting in self._changed:
+    def _forget(self, settings: Iterable[PodSetting]) -> None:
+        for setting in settings:
             self._found.pop(setting, None)
-        self._changed.clear()
-        self._changes = None
-        self._start = None
-        self._is_changing = False
 
     def all_values(self, setting: PodSetting) -> NDArray[np.complex128]:
         """All eigenvalues [rad/s]."""
         if setting not in self._whole:
             with one_thread():
                 model = self._loop.model(setting)
-                if setting in self._changed:  # it is chosen: its swings are asked for as well
+                if setting in self._form:  # it is chosen: its swings are asked for as well
                     self._spectra[setting] = find_spectrum(model, *ELECTROMECHANICAL_HZ)
                     self._whole[setting] = self._spectra[setting].eigenvalues
                 else:
