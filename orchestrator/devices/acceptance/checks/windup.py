@@ -23,8 +23,9 @@ from orchestrator.devices.acceptance.checks.port import (
 )
 from orchestrator.devices.acceptance.checks.subject import OperatingAt, Subject
 
-_SHORT = 0.6  # duration of an event [s] in which an angle and a filter have come to rest
+_SHORT = 0.6  # duration of an event [s] in which a filter has come to rest, and most angles
 _LONG = 1.8  # duration of a long one [s]
+_BETWEEN = 1.2  # of one half way, in which a droop's angle has come to rest as well
 _WINDOW = 0.1  # time from one look at the current to the next [s]
 _WINDOWS = 200  # looks, at most, until the device has come to rest
 _QUIET = 3  # looks in a row in which it is at rest
@@ -34,6 +35,12 @@ _MORE = 0.3
 """Part of what a short event leaves behind by which a long one may leave more.
 
 Matching control, virtual machines, oscillators and droops with anti-windup have at most 0.2, without it 1.2 to 1.8."""
+
+_GOES_ON = 0.25
+"""Part of what a long event leaves more than a short one that comes in the second half of their difference.
+
+An integral at the limit goes on evenly and has half of it there; a droop's angle that had not come to rest in the short
+event has at most 0.04."""
 
 _LEAST = 0.06  # what the long one leaves more [pu·s, S_n] from which it is judged
 
@@ -87,23 +94,24 @@ def anti_windup(subject: Subject) -> CheckResult:
         words = f"{in_words(complex(voltage))} from P_0 = {point.P:g}, Q_0 = {point.Q:g}"
         try:
             with subject.while_doing(f"in the {words} and after it"):
-                short, long = (
-                    _watch(subject, point, voltage, times * lasts) for lasts in (_SHORT, _LONG)
+                short, between, long = (
+                    _watch(subject, point, voltage, times * lasts)
+                    for lasts in (_SHORT, _BETWEEN, _LONG)
                 )
         except ComponentError as error:
             subject.doing = ""
             unknown.append(f"{error.log or error.status} in the {words}")
             continue
-        more = long.away - short.away
-        if max(_LEAST, _MORE * short.away) < more < _AT_MOST * short.away:
-            says = f"the {words} leaves {long.away:.3g} pu·s of its current behind "
-            says += f"after {times * _LONG:.3g} s and {short.away:.3g} pu·s after {times * _SHORT:.3g} s: "
-            says += "it grows with the time at the limit"
-            return failed("anti_windup", "winds up", says, long=long.away, short=short.away)
+        if _winds_up(short, between, long):
+            says = f"the {words} leaves {long.away:.3g} pu·s of its current behind after {times * _LONG:.3g} s, "
+            says += f"{between.away:.3g} after {times * _BETWEEN:.3g} s "
+            says += f"and {short.away:.3g} after {times * _SHORT:.3g} s: it goes on with the time at the limit"
+            figures = {"long": long.away, "between": between.away, "short": short.away}
+            return failed("anti_windup", "winds up", says, **figures)
         if not (short.rests and long.rests):
             unknown.append(f"it does not come to rest after the {words}")
             continue
-        if more > max(_LEAST, short.away):
+        if long.away - short.away > max(_LEAST, short.away):
             unknown.append(f"it leaves its angle in the {words}")
             continue
         compared += 1
@@ -124,6 +132,15 @@ def _summary(compared: int, unknown: list[str], *, ends: bool) -> CheckResult:
     says = f"after {compared} dips and overvoltages, short and long, it is back alike"
     says += f"; not judged: {unknown[0]}" if unknown else ""
     return passed("anti_windup", says, compared=compared)
+
+
+def _winds_up(short: _Left, between: _Left, long: _Left) -> bool:
+    """Tell if what is left goes on with the time at the limit: evenly, or, where it turns the angle, back and forth."""
+    more, later = long.away - short.away, long.away - between.away
+    grows = max(_LEAST, _MORE * short.away) < more < _AT_MOST * short.away
+    least = min(between.away, long.away)
+    differs = max(_LEAST, _MORE * least) < abs(later) < _AT_MOST * least
+    return (grows and later > _GOES_ON * more) or (differs and between.rests and long.rests)
 
 
 def _watch(subject: Subject, point: OperatingAt, voltage: float, lasts: float) -> _Left:
