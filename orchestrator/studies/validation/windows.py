@@ -62,6 +62,11 @@ class Windows:
     second: float | None = None
 
     @property
+    def lasts(self) -> bool:
+        """Return whether the event ends within the recording: a change in its last samples is none to judge."""
+        return self.begin < self.end
+
+    @property
     def until(self) -> float:
         """The time up to which what is seen is of this event [s]."""
         return self.length if self.second is None else self.second
@@ -91,16 +96,16 @@ def find_windows(recording: Recording) -> Windows:
     first = _first(recording)
     for still in (_without_slope(recording.voltage, first), recording.power):
         found = _event(recording, still, first)
-        if found is not None:
+        if found is not None and found.lasts:
             return found
     shortest = max(5, round(_SHORTEST_FIRST / recording.interval))
     for still in (_without_slope(recording.voltage, shortest), recording.power):
         found = _early_event(recording, still, shortest, first)
-        if found is not None:
+        if found is not None and found.lasts:
             return found
     for still in (_without_slope(recording.voltage, first), recording.power):
         found = _slow_event(recording, still, first)
-        if found is not None:
+        if found is not None and found.lasts:
             return found
     third = recording.length / 3
     return Windows(third, 2 * third, recording.length, seen=False)

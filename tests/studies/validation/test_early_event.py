@@ -97,6 +97,15 @@ def test_a_load_that_is_switched_before_a_fault_is_not_the_event():
     assert found.begin == pytest.approx(3.0, abs=2e-3)
 
 
+@pytest.mark.parametrize("interval", [1e-3, 0.02])
+@pytest.mark.parametrize("before", [0, 1, 2])
+def test_a_change_in_the_last_samples_is_no_event(before, interval):
+    """Nothing is left of it to judge."""
+    last = interval * (round(LENGTH / interval) - 1 - before)
+    found = windows(lambda times: 1 - 0.1 * (times >= last - 1e-9) + 0j, interval)
+    assert found.begin < found.end
+
+
 def test_noise_alone_has_no_event():
     assert not windows(lambda times: np.ones(len(times), complex), noise=3e-3).seen
 
