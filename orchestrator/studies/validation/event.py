@@ -28,7 +28,7 @@ from orchestrator.studies.validation.filled import Mask, runs_of
 from orchestrator.studies.validation.frames import frames_of, grid_of_frames
 from orchestrator.studies.validation.held_by_samples import fastest_corner, is_too_fast
 from orchestrator.studies.validation.other_event import ask_of_other_event
-from orchestrator.studies.validation.out_of_step import slip, step_loss
+from orchestrator.studies.validation.out_of_step import StepLoss, slip, step_loss
 from orchestrator.studies.validation.parameters import NEVER
 from orchestrator.studies.validation.plant_out_of_step import plant_loss
 from orchestrator.studies.validation.questions import Question, QuestionKind
@@ -50,6 +50,10 @@ _NO_NOISE = 2e-6  # scatter of P and Q before the event [pu] that no instrument 
 _TOO_GOOD = 1e-4  # median error [pu] beside a recording without noise, as the model's own
 _MOVED = 2e-3  # rms movement [pu] that is an event
 _SLOWER_THAN = 0.015  # interval between samples [s] of which is said what it cannot show
+_SHOWS_SLIP = 0.003
+"""Interval between samples [s] up to which a model that turns past its plant is wrong.
+
+Of 26 right models beside samples 1 ms apart none did; beside samples 5 ms apart one of two."""
 _SUCH = 3  # times of a device that are named, which the samples do not show
 _SHORT_GAP = 0.02  # [s]: over a period voltages are means, and a gap hides little
 _IN_GAP = 0.3  # part of the largest change of the voltage, from which on a gap hides an event
@@ -416,13 +420,19 @@ def _of_plant(comparison: EventComparison) -> list[Question]:
 
 
 def _of_step(comparison: EventComparison) -> list[Question]:
-    """A model that falls out of step where the plant did not; a note where it comes back, or hardly feeds any power."""
+    """A model that falls out of step where the plant did not; a note where it comes back, or is off by little.
+
+    Beside slow samples the right model may fall so, for the voltage between them is not known: that is no note."""
     event = comparison.event
     recording = event.recording
     loss = step_loss(recording, event.windows, comparison.played.power)
     slips = None if loss else slip(recording, event.windows, comparison.played.power)
-    if slips is not None:
+    if slips is not None and recording.interval <= _SHOWS_SLIP:
         return [Question(QuestionKind.SLIP, {"at": recording.begin + slips})]
+    if slips is not None:
+        late = recording.times >= slips
+        own, seen = (float(x.real[late].mean()) for x in (comparison.played.power, recording.power))
+        loss = StepLoss(slips, own, seen)
     if loss is None:
         return []
     figures = {"at": recording.begin + loss.time, "own": loss.own, "seen": loss.seen}

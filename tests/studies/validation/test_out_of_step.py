@@ -162,3 +162,12 @@ def test_a_model_that_swings_or_has_another_sign_does_not_slip(angle):
 
 def test_the_angle_of_no_current_tells_no_slip():
     assert slipped(np.clip(TIMES - 2, 0, None), own=0.05) is None
+
+
+def test_a_model_that_turns_past_its_plant_beside_slow_samples_leaves_the_verdict_open():
+    """The right model may fall so there, for the voltage between the samples is not known."""
+    recorded = made(stiff(-40, 1350.0)).iloc[::5]
+    found = validated(recorded, PLANT | NO_RESISTANCE, limits=EXAMPLE)
+    assert "slips" not in kinds(found)
+    assert "out of step" in kinds(found)
+    assert found.verdict == "open"
