@@ -112,11 +112,12 @@ class Fit:
     error_after: float
     runs: int
     finished: bool = True
+    beyond: float | None = None  # error after it that no jump between two samples may have made
 
     @property
     def reached(self) -> bool:
         """Return whether the device comes near to the recordings with the fitted values."""
-        return self.error_after <= _REACHED
+        return (self.error_after if self.beyond is None else self.beyond) <= _REACHED
 
     @property
     def holds(self) -> bool:
@@ -218,6 +219,9 @@ def fit_parameters(
     numbers = _numbers(best, wanted, residuals)
     if finished and rms(best.errors) > max(_REACHED, _LEAVES * rms(before)):
         numbers = [_left_at_start(one) for one in numbers]
+    beyond = None
+    if finished and rms(best.errors) > _REACHED:
+        beyond = rms(np.maximum(np.abs(best.errors) - residuals.doubt_between(values), 0.0))
     parameters = [*_switches(best, searches, starts, residuals), *numbers]
     if not finished:
         parameters = [_interrupted(one) for one in parameters]
@@ -228,6 +232,7 @@ def fit_parameters(
         error_after=rms(best.errors),
         runs=residuals.runs,
         finished=finished,
+        beyond=beyond,
     )
 
 

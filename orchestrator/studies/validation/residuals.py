@@ -106,6 +106,26 @@ class Residuals:
         self._made += len(self.stretches)
         return other.at(values) - self.at(values)
 
+    def doubt_between(self, values: Values) -> Numbers:
+        """By how much each error may be the moment of a jump between two samples [scatters]; 0 of slow samples.
+
+        As of a limit: of fast ones that explains an error and makes none. Of slow ones it may be all of an error, and
+        would let any model pass."""
+        here, doubt = self.at(values), np.zeros(0)
+        for part in (0.0, 1.0):
+            stretches = [
+                one
+                if one.event.recording.interval >= _SLOW
+                else replace(one, event=replace(one.event, recording=_jumps_at(part)(one.event)))
+                for one in self.stretches
+            ]
+            other = Residuals(self.device, stretches, self.report)
+            other.hidden = self.hidden
+            self._made += len(self.stretches)
+            moved = np.abs(other.at(values) - here)
+            doubt = np.maximum(doubt, moved) if len(doubt) else moved
+        return doubt
+
     def of_other_voltages(self, values: Values) -> list[Matrix]:
         """By how much the errors change with what else the voltage may have done between slow samples.
 

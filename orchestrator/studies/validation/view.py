@@ -151,6 +151,7 @@ class Validation:
             "fit_finished": fit.finished,
             "fit_reached": fit.reached,
             "fit_error_scatters": fit.error_after,
+            "fit_error_beyond_jumps_scatters": fit.beyond,
             "fit_runs": fit.runs,
             "fit_events": checks,
         }

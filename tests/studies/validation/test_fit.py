@@ -273,3 +273,41 @@ def test_the_wrong_position_of_a_switch_is_fitted_once_where_the_other_one_will_
     wanted = Wanted([Adjustable("K", "1", start=80.0, low=0.0, high=1000.0)], ["on"])
     fit._search(CreepingErrors(), wanted, [])
     assert fitted == [False, True] if reached else sorted(fitted) == [False] * 5 + [True] * 5
+
+
+@pytest.fixture(scope="module")
+def limited():
+    """A plant at its limit of the current in a fault, up to 0.9 s after it."""
+    fault = {"time": 1.0, "component": "grid", "type": "bus_fault", "bus": "bus_2"}
+    case = gfor_in_python.load("two_area").with_(
+        events=[fault | {"X": 0.01, "duration": 0.1}],
+        solver={"record_interval": "1 ms", "record_filter": "low-pass"},
+    )
+    own = {"gfor.current_limit.kind": 3, "gfor.current_limit.I_max": 1.0}
+    return with_noise(table(case.scenario("pod_p", own).run(stop=2.0).dataset), 2)
+
+
+def fit_of_limit(frame, **wrong):
+    """The fit of a limit of 1.1 pu, in a model of which other values may be wrong."""
+    values = {"current_limit.kind": 3, "current_limit.I_max": 1.1} | wrong
+    given = {"values": ON | values, "fit": "current_limit.I_max", "step": STEP}
+    return gfor_in_python.validate("gfor", frame.set_index("time"), **given).result.fit
+
+
+@pytest.mark.slow
+def test_a_limit_at_the_truth_holds_though_a_jump_leaves_more_than_noise(limited):
+    """What a fault's begin and end leave between two samples is no error of the model's."""
+    found = fit_of_limit(limited)
+    (limit,) = found.parameters
+    assert limit.low < 1.0 < limit.high
+    assert found.error_after > 3  # times the noise, as the samples are
+    assert found.beyond < 1.5
+    assert found.holds
+
+
+@pytest.mark.slow
+def test_a_limit_beside_another_wrong_value_does_not_hold(limited, monkeypatch):
+    monkeypatch.setattr(fit, "_starts", lambda residuals, told, switches: iter([told]))
+    found = fit_of_limit(limited, **{"transformer.X_t": 0.2})
+    assert found.beyond > 10
+    assert not found.holds
