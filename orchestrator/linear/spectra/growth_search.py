@@ -26,6 +26,10 @@ _RING = 1.6  # ratio of the radii of a ring
 _AT_A_TIME = (20, 80)
 _STANDS_OUT = 1.1  # multipliers of a step map beyond this size are found as the largest ones
 _THINNEST = 1e-3  # smallest size of a sector, relative to its radius
+_REAL = 1e-6
+"""Part of an eigenvalue up to which its imaginary part is rounding: a search around a complex point leaves one to real
+eigenvalues, of either sign."""
+
 _BESIDE = 1e-4  # part of an eigenvalue by which the point that gives its vectors lies beside it
 _NEAREST = 2  # so many modes are found there, of which one is it
 
@@ -114,7 +118,8 @@ def _ring(inner: float, outer: float, limit: float) -> list[_Sector]:
     low = float(np.arccos(min(1.0, limit / inner)))
     middle = (np.pi / 4,) if low < np.pi / 8 else ()
     # A little below 0, which puts eigenvalues on the real axis inside a sector.
-    return [_Sector(inner, outer, *angles) for angles in pairwise((low - 1e-9, *middle, np.pi / 2))]
+    angles = (low - _REAL, *middle, np.pi / 2)
+    return [_Sector(inner, outer, *between) for between in pairwise(angles)]
 
 
 def _standing_out(model: LinearModel, step_size: float) -> list[complex]:
@@ -146,7 +151,12 @@ def _values_in(
         values = search.reaching(float(np.abs(sector.edge - sector.centre).max()), sector.holds)
     else:
         values = _one_by_one(model, sector, search)
-    return None if values is None else [value for value in values.tolist() if sector.holds(value)]
+    if values is None:
+        return None
+    is_real = np.abs(values.imag) <= _REAL * np.abs(values)
+    held = [sector.holds(value) for value in values.tolist()]
+    found: list[complex] = np.where(is_real, values.real, values)[held].tolist()
+    return found
 
 
 def _one_by_one(
