@@ -62,6 +62,8 @@ def _jump(recording: Recording, windows: Windows, signals: tuple[Complex, Comple
     both: list[Mask] = []
     for signal in signals:
         bends = _bends(recording, signal, _JUMP)
+        if len(bends) <= near:
+            return None  # as where times in minutes are read as seconds
         swing = _bends(recording, signal, _SWING)[after:][: round(_BLOCK / grain)]
         behind = np.concatenate([np.full(near, np.inf), bends[: len(bends) - near]])
         before = _largest(np.concatenate([np.full(beside - 1, 0.0), behind]), beside)
