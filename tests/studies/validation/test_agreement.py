@@ -23,6 +23,8 @@ def said(fitted, kept, scatter=1e-4):
     [
         ((0.01, 0.001), (0.008, 0.001), "june was kept back, and agrees", True),
         ((0.01, 0.001), (0.008, 0.0078), "june was kept back, and does NOT agree", False),
+        ((0.01, 0.001), (0.008, 0.005), "june was kept back, and does NOT agree", False),
+        ((0.01, 0.001), (0.008, 0.004), "june was kept back, and agrees", True),
         ((0.01, 0.001), (0.008, 0.012), "june was kept back, and does NOT agree", False),
         ((0.01, 0.001), (1.6e-4, 1.5e-4), "june was kept back, and agrees", True),
         ((1.5e-4, 1.49e-4), (1.5e-4, 1.5e-4), "june was kept back, and tells nothing", None),
