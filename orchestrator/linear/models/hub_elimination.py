@@ -13,7 +13,7 @@ For a search the dense block may be divided (`divided_hub`): a solution is close
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Protocol
 
 import numpy as np
@@ -66,10 +66,18 @@ class LeftOver:
     """The rest of its equations that a solution leaves over.
 
     ``of_right``: as a part of the right side's largest element.
-    ``of_terms``: as a part of the largest sum of the sizes of an equation's terms."""
+    ``size``: its largest element.
+    ``terms``: adds up the sizes of each equation's terms, which takes longer than a solution, and returns the largest
+    sum."""
 
     of_right: float
-    of_terms: float
+    size: float
+    terms: Callable[[], float]
+
+    @property
+    def of_terms(self) -> float:
+        """Its size, as a part of the largest sum of the sizes of an equation's terms."""
+        return self.size / self.terms()
 
     @property
     def is_accurate(self) -> bool:
@@ -329,7 +337,8 @@ class HubFactors:
             rest = b - self._product(found)
             left = float(np.abs(rest).max())
             left = left if np.isfinite(left) else np.inf
-            yield LeftOver(left / float(np.abs(right).max()), left / self._terms(found))
+            of_right = left / float(np.abs(right).max())
+            yield LeftOver(of_right, left, partial(self._terms, found))
 
     @property
     def log_determinant(self) -> complex:

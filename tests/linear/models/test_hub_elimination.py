@@ -8,7 +8,7 @@ import scipy.linalg
 import scipy.sparse as sp
 
 from orchestrator.linear.models import hub_elimination
-from orchestrator.linear.models.hub_elimination import hub_equations
+from orchestrator.linear.models.hub_elimination import HubFactors, hub_equations
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.critical_modes import find_critical_modes
 from orchestrator.linear.spectra.modes import eigenvalues, find_modes
@@ -162,6 +162,16 @@ def test_next_to_zeros_rounding_is_no_reason_to_factorise_the_whole(part):
     assert not next(factors.left_over(b)).of_right <= hub_elimination._ACCURATE
     found, dense = factors.solve_exactly(b), np.linalg.solve(shifted, b)
     assert np.abs(found - dense).max() < 1e-9 * np.abs(dense).max()
+
+
+def test_an_equations_terms_are_added_up_only_where_much_is_left_over(monkeypatch):
+    asked = []
+    terms = HubFactors._terms
+    monkeypatch.setattr(HubFactors, "_terms", lambda *given: asked.append(1) or terms(*given))
+    assert system().hub.at(-0.3 + 5j) is not None
+    assert not asked
+    assert with_integrators().hub.at(1e-4) is not None
+    assert asked
 
 
 def test_critical_modes_are_those_of_the_full_spectrum():
