@@ -1,5 +1,6 @@
 """The modes of a scenario: steady state, linear model, modes with names, and what they say of the coupling."""
 
+import copy
 import fnmatch
 import math
 from cmath import phase
@@ -24,7 +25,7 @@ from orchestrator.core.options import Option
 from orchestrator.core.threads import side_by_side
 from orchestrator.devices.binding.misfits import Misfit
 from orchestrator.linear.doubts.common_speed import name_common_speed, tell_common_speed
-from orchestrator.linear.doubts.examination import examine
+from orchestrator.linear.doubts.examination import Examination, examine
 from orchestrator.linear.doubts.excitation_limiters import limiter_warnings
 from orchestrator.linear.doubts.external_exciters import settled_warnings, start_warnings
 from orchestrator.linear.doubts.motor_starts import motor_warnings
@@ -295,11 +296,31 @@ class Linearised:
             self._said += (_too_large(states, frequency_range),)
         self.named: NamedSystem | None = None
         self._of_system: Future[spectra.Spectrum | Decay | None]
+        self._examined: Examination | None = None
 
     @property
     def size(self) -> int:
         """Number of states of the step map."""
         return len(self._model.names)
+
+    def stands_as(self, other: PreparedScenario) -> bool:
+        """Return whether another scenario starts from the same system, so that its linear model is this one.
+
+        Events come later, and change none of it."""
+        own, other = in_service(self._prepared), in_service(other)
+        return (
+            (own.step_size, own.stop_time, own.schedule)
+            == (other.step_size, other.stop_time, other.schedule)
+            and own.system.components == other.system.components
+            and own.system.connections == other.system.connections
+            and own.system.wires == other.system.wires
+        )
+
+    def of(self, prepared: PreparedScenario) -> "Linearised":
+        """Return the same under the name of another scenario that `stands_as` it does; nothing is computed again."""
+        other = copy.copy(self)
+        other._prepared, other.named = prepared, None
+        return other
 
     def begin(self, pool: Executor) -> None:
         if self._system is not None and LEAST_STATES <= len(self._system.names) <= WHOLE:
@@ -395,7 +416,7 @@ class Linearised:
         else:
             swinging = shown = critical_modes
             naming, named, oscillating = Naming({}), {}, []
-        examined = examine(
+        examined = self._examined = self._examined or examine(
             self._master,
             self._blocks,
             model,

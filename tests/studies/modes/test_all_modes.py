@@ -46,6 +46,15 @@ def test_each_scenario_gives_what_it_gives_alone_to_the_last_bit(scenarios, watc
     assert told == expected
 
 
+def test_scenarios_of_other_events_alone_are_computed_once_and_are_those_of_each_alone(watched):
+    told, _ = watched
+    alike = [one.prepared for one in gfor.load("infinite_bus").choose(("dip", "load_step"))]
+    together = compute_all_modes(alike)
+    assert [one.prepared.name for one in together] == ["dip", "load_step"]
+    assert modes_json(together) == modes_json([compute_modes(one) for one in alike])
+    assert told == ["open dip", "close dip"]
+
+
 def test_critical_modes_are_those_of_each_alone(scenarios):
     assert modes_json(compute_all_modes(scenarios, (0.1, 2.0), 0.3)) == modes_json(
         [compute_modes(one, (0.1, 2.0), 0.3) for one in scenarios]
