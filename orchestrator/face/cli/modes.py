@@ -128,7 +128,8 @@ def _compute(
             console.print(escape(none), highlight=False, soft_wrap=True)
         elif whole:
             console.print(all_modes(result, whole=options.details), "")
-    terminal.print_named_modes(console, results, shapes=whole or any(r.named for r in results))
+    shapes = whole or any(r.named for r in results)
+    terminal.print_named_modes(console, results, shapes=shapes, details=options.details)
     terminal.print_sources(console, results)
     if options.details:
         print_details(console, results)

@@ -62,7 +62,7 @@ def print_run(
     answers = [of_run(r) for r in results]
     relays = [f"{one.subject}: {one.quiet_relays}" for one in answers if one.quiet_relays]
     print_answers(console, answers, modes, [*beside, *faults, *relays], details=details)
-    print_named_modes(console, modes)
+    print_named_modes(console, modes, details=details)
     print_sources(console, modes)
     ring_downs = tables.ring_downs(results)
     if ring_downs is not None:

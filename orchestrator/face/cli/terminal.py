@@ -91,11 +91,12 @@ def say(kind: str, texts: Iterable[str]) -> None:
 
 
 def print_named_modes(
-    console: Console, results: Sequence[ModesResult], *, shapes: bool = True
+    console: Console, results: Sequence[ModesResult], *, shapes: bool = True, details: bool = False
 ) -> None:
     """The modes that a case names, beside somebody else's figures for them, and who swings in them.
 
-    Figures that the answers show already are not repeated."""
+    Figures that the answers show already are not repeated. ``details``: shows the shapes of all modes where none has a
+    name."""
     from orchestrator.studies.runs import tables  # noqa: PLC0415 - imports all that a run needs
     from orchestrator.studies.runs.answer_of_modes import name_of_answers  # noqa: PLC0415 - as well
 
@@ -107,7 +108,7 @@ def print_named_modes(
         print_reference(console, results)
         console.print("")
     if shaped:
-        console.print(tables.mode_shapes(results, with_values=told), "")
+        console.print(tables.mode_shapes(results, with_values=told, whole=details), "")
 
 
 def print_reference(console: Console, results: Sequence[ModesResult]) -> None:

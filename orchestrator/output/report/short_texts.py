@@ -12,10 +12,10 @@ LONGEST_REMARK = 120
 _ITEMS_SHOWN = 5  # how many of a long list are shown, largest first
 
 
-def first_few(items: Iterable[Any], text: Callable[[Any], str]) -> str:
+def first_few(items: Iterable[Any], text: Callable[[Any], str], most: int = _ITEMS_SHOWN) -> str:
     items = list(items)
-    shown = ", ".join(text(item) for item in items[:_ITEMS_SHOWN])
-    return shown + (f" … {len(items)} in all" if len(items) > _ITEMS_SHOWN else "")
+    shown = ", ".join(text(item) for item in items[:most])
+    return shown + (f" … {len(items)} in all" if len(items) > most else "")
 
 
 def kinds_of(said: Iterable[tuple[Told, Iterable[str]]]) -> list[tuple[str, list[Told]]]:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
 from orchestrator.cases.scenario.flow_figures import power_flow_json
+from orchestrator.linear.spectra.modes import Mode
 from orchestrator.output.report import mode_tables
 from orchestrator.output.report.column_table import ShownTable
 from orchestrator.output.report.mode_tables import eigenvalue_text
@@ -21,6 +24,16 @@ from orchestrator.studies.modes.modes import ModesResult, named_json
 
 if TYPE_CHECKING:  # modes have tables as well, and need no run
     from orchestrator.studies.runs.run import RunResult
+
+
+_SHAPES_SHOWN = 12
+"""Shapes of modes without a name that a screen shows."""
+
+_IN_A_CELL = 5
+"""Components that a cell names in a mode with a name."""
+
+_IN_A_CELL_OF_MANY = 3
+"""The same without: in a large system each takes half a line, and a row as many lines as the longest cell."""
 
 
 def steady_states(results: Sequence[ModesResult]) -> Table:
@@ -48,30 +61,77 @@ def named_modes(results: Sequence[ModesResult], reference: str | None) -> ShownT
     return mode_tables.named_modes([named_json(r) for r in results], reference)
 
 
-def mode_shapes(results: Sequence[ModesResult], *, with_values: bool = False) -> Table:
-    """Who swings against whom in the modes with a name, or in all where none has one, and who takes part.
+@dataclass(frozen=True)
+class _Shape:
+    """A mode whose shape is shown, and the words that stand for it."""
 
-    ``with_values``: shows the eigenvalues as well, if no other table does."""
+    label: str
+    result: ModesResult
+    mode: Mode
+
+
+def mode_shapes(
+    results: Sequence[ModesResult], *, with_values: bool = False, whole: bool = False
+) -> Table:
+    """Who swings against whom in the modes with a name, and who takes part; where none has one, in the swings with the
+    least damping.
+
+    ``with_values``: shows the eigenvalues as well, if no other table does.
+    ``whole``: shows all modes where none has a name; else a line below counts the others."""
     names = list(dict.fromkeys(name for r in results for name in r.named))
-    entries = [(name, r, r.named[name]) for name in names for r in results if name in r.named]
-    if not names:
-        entries = [(f"{mode.frequency_hz:.3f} Hz", r, mode) for r in results for mode in r.modes]
-    groups = [mode.swing_groups(r.swing) for _, r, mode in entries]
+    shapes = _of_named(results, names) if names else _of_unnamed(results, whole=whole)
+    groups = [shape.mode.swing_groups(shape.result.swing) for shape in shapes]
     across, areas = any(group.between for group in groups), any(r.areas for r in results)
     columns = ["Scenario" if len(names) == 1 else "Mode"] + ["Mode [rad/s]"] * with_values
     columns += ["Swing together", "Against"]
     columns += ["In between"] * across + ["Participation by component"] + ["By area"] * areas
+    few = partial(first_few, most=_IN_A_CELL if names else _IN_A_CELL_OF_MANY)
     table = make_table("Mode shapes", *columns, left=len(columns))
-    for (label, r, mode), group in zip(entries, groups, strict=True):
-        sides = [first_few(side, str) for side in r.swing_of(mode)]
+    for shape, group in zip(shapes, groups, strict=True):
+        r, mode = shape.result, shape.mode
+        sides = [few(side, str) for side in r.swing_of(mode)]
         between = [f"{s.partition('.')[0]} {angle:+.0f}°" for s, angle in group.between.items()]
-        sides += [first_few(between, str)] * across
-        row = [r.prepared.title if len(names) == 1 else f"{label}: {r.prepared.title}"]
-        row += [eigenvalue_text(mode.eigenvalue)] * with_values + sides
-        row.append(first_few(mode.by_component.items(), share_text))
-        row += [first_few(r.by_area(mode).items(), share_text)] if areas else []
+        sides += [few(between, str)] * across
+        row = [shape.label, *[eigenvalue_text(mode.eigenvalue)] * with_values, *sides]
+        row.append(few(mode.by_component.items(), share_text))
+        row += [few(r.by_area(mode).items(), share_text)] if areas else []
         table.add_row(*row)
+    rest = 0 if names else sum(len(r.modes) for r, _ in _unlike(results)) - len(shapes)
+    if rest:
+        table.caption = f"and {rest} more, swings with more damping and controls: --details"
+        table.caption_justify = "left"
     return table
+
+
+def _of_named(results: Sequence[ModesResult], names: Sequence[str]) -> list[_Shape]:
+    return [
+        _Shape(r.prepared.title if len(names) == 1 else f"{name}: {r.prepared.title}", r, mode)
+        for name in names
+        for r in results
+        if (mode := r.named.get(name)) is not None
+    ]
+
+
+def _of_unnamed(results: Sequence[ModesResult], *, whole: bool) -> list[_Shape]:
+    """All modes, or the swings with the least damping, fewer of each system where there are more."""
+    unlike, shapes = _unlike(results), list[_Shape]()
+    for r, titles in unlike:
+        swings, _ = r.swings_apart()
+        first = sorted(swings or r.modes, key=lambda mode: mode.damping_ratio)
+        behind = f": {titles}" if len(unlike) > 1 else ""
+        shapes += [
+            _Shape(f"{mode.frequency_hz:.3f} Hz, {mode.damping_percent:.2f} %{behind}", r, mode)
+            for mode in (r.modes if whole else first[: max(1, _SHAPES_SHOWN // len(unlike))])
+        ]
+    return shapes
+
+
+def _unlike(results: Sequence[ModesResult]) -> list[tuple[ModesResult, str]]:
+    """The first result of each system, with the titles of those that have its modes, as where only events differ."""
+    alike: dict[tuple[complex, ...], list[ModesResult]] = {}
+    for r in results:
+        alike.setdefault(tuple(mode.eigenvalue for mode in r.modes), []).append(r)
+    return [(same[0], ", ".join(r.prepared.title for r in same)) for same in alike.values()]
 
 
 def power_flows(results: Sequence[ModesResult]) -> Iterator[Table | ShownTable]:
