@@ -18,6 +18,7 @@ from math import isnan
 
 from fmus.grid.element_data import LAWS, Load, Zip
 from fmus.induction_machine.dyr_records import SUBSYSTEMS
+from orchestrator.cases.form.remedies import without_models
 from orchestrator.cases.networks.conversion import bus_of
 from orchestrator.cases.networks.psse.air_conditioners import FIELDS, running_law
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, number_in
@@ -43,11 +44,24 @@ COMPOSITE_NAMES = tuple(
 MODEL = "induction_generator_phasor"  # the machine by its reactances
 _SHARES = slice(18, 23)  # of motors A to D and of the electronic load
 _D = 3  # place of motor D among them
+_SUM_OF_PERCENT = 2.0
+"""Sum of the shares [pu] above which they are in percent, as it seems."""
+
+_COUNTS = 7
+"""How many whole values describe a user's model: two codes, and the counts of ICONs, CONs, states, variables and
+reserved ICONs."""
+
+_ICONS = 2  # place of the number of whole values behind these seven
+_CONS = 3  # place of the number of the other values
+_HIGHEST_REACTANCE = 1
+"""Reactance of a feeder [pu], which stands in the place of the number of CONs where nothing describes the model."""
+
 _STATIC = slice(27, 37)  # exponent and share, twice, and factor of the frequency: of P, then of Q
 _MOTORS = {"a": 37, "b": 57, "c": 77}  # place of each motor's numbers
 _AIR_CONDITIONER = slice(97, 97 + len(FIELDS))  # motor D
 _OF_MOTOR = ("RA", "X", "Xp", "Xpp", "Tp", "Tpp", "H", "E")  # behind its type and its loading
 _THREE_PHASES = 3.0
+_ONE_PHASE = 1.0
 LEAKAGE = 0.8
 """Leakage by subtransient reactance: the record has none, and the model's equations leave it out."""
 _SHOWN = 8
@@ -98,13 +112,33 @@ def composite_remarks(found: CompositeLoads) -> Iterator[Problem]:
         place = next(record.place for record in found.records if record.name == name)
         p_mw = sum(motor.drawn.real for motor in own)
         buses = few(dict.fromkeys(bus_of(str(motor.load.bus)) for motor in own), _SHOWN)
+        of_motors = (
+            f"{number_of(len(own), 'induction motor')} A to C for {p_mw:.4g} MW ({buses})"
+            if own
+            else "none of motors A to C draws power"
+        )
         text = (
-            f"{name}, a composite load, is approximated: {number_of(len(own), 'induction motor')} A to C for "
-            f"{p_mw:.4g} MW ({buses}), motor D by what it draws while it runs, the electronic load as a constant "
-            "power, the static load by its exponents. The transformer and the feeder before it, tripping and stalling "
-            f"are left out; to see what that is worth, leave it out: dyr_leave_out = ['{name}'] in [units]"
+            f"{name}, a composite load, is approximated: {of_motors}, motor D by what it draws while it runs, the "
+            "electronic load as a constant power, the static load by its exponents. The transformer and the feeder "
+            "before it, tripping and stalling are left out; to see what that is worth, leave it out: "
+            f"dyr_leave_out = ['{name}'] in [units]"
         )
         yield Problem(place, text, topic=QuestionTopic(f"{name} approximated"))
+    for record in found.records:
+        yield from _of_types(record)
+
+
+def _of_types(record: DynamicRecord) -> Iterator[Problem]:
+    """Ask about motors A to C that draw power and are of a type that there is not."""
+    numbers = _numbers(record)
+    for (letter, at), share in zip(_MOTORS.items(), numbers[_SHARES], strict=False):
+        if share and numbers[at] not in (_THREE_PHASES, _ONE_PHASE):
+            text = (
+                f"{record.name} has the type {numbers[at]:g} of motor {letter.upper()}, which draws {share:g} of the "
+                "load; there are 3, of three phases, and 1, of one. It is taken as a constant power; correct the type"
+            )
+            topic = QuestionTopic("a motor of no known type", record.name)
+            yield Problem(record.place, text, topic=topic)
 
 
 def _record_for(load: FileLoad, records: RecordsOfLoads) -> DynamicRecord | None:
@@ -119,20 +153,66 @@ def _record_for(load: FileLoad, records: RecordsOfLoads) -> DynamicRecord | None
 
 def _numbers(record: DynamicRecord) -> list[float]:
     wanted = next(count for edition, count in _NUMBERS.items() if record.name.endswith(edition))
-    numbers = [number_in(text) for text in record.values[-wanted:]]
-    if len(numbers) != wanted or any(map(isnan, numbers)):
-        raise InputError(
-            f"{record.place}: {record.name} has {number_of(len(record.values), 'value')} behind its name; it ends with "
-            f"{wanted} numbers"
+    numbers = [number_in(text) for text in _texts(record, wanted)]
+    if any(map(isnan, numbers)):
+        at = next(k for k, number in enumerate(numbers) if isnan(number))
+        text = record.values[len(record.values) - wanted + at]
+        raise InputError.at(
+            record.place,
+            f"{record.name} has {text!r} as number {at + 1} of its {wanted}; it must be a number",
         )
     shares = numbers[_SHARES]
     if min(shares) < 0 or sum(shares) > 1 + 1e-6:
         told = ", ".join(f"{share:g}" for share in shares)
-        raise InputError(
-            f"{record.place}: {record.name} has the shares {told} of motors A to D and the electronic load; each is "
-            "0 or more, and their sum 1 at most"
+        ask = "; are they in percent?" if sum(shares) > _SUM_OF_PERCENT else ""
+        raise InputError.at(
+            record.place,
+            f"{record.name} has the shares {told} of motors A to D and the electronic load; each is "
+            f"0 or more, and their sum 1 at most{ask}",
         )
     return numbers
+
+
+def _texts(record: DynamicRecord, wanted: int) -> Sequence[str]:
+    """Return the texts of a record's numbers, as many as it needs and as those before them declare.
+
+    Raises
+    ------
+    InputError
+        If there are others: by their end alone all would be taken for their neighbours.
+    """
+    texts, counts = record.values, record.values[:_COUNTS]
+    remedy = f"correct the record, or write {without_models([record.name])}"
+    if not _are_counts(counts):
+        if len(texts) == wanted:
+            return texts
+        raise InputError.at(
+            record.place,
+            f"{record.name} has {number_of(len(texts), 'value')} behind its name; it ends with {wanted} numbers, "
+            f"behind the {_COUNTS} whole ones of a user's model where it is written as USRLOD; {remedy}",
+        )
+    declared, before = int(counts[_CONS]), _COUNTS + int(counts[_ICONS])
+    if declared != wanted:
+        fit = next((edition for edition, count in _NUMBERS.items() if count == declared), None)
+        other = f", as {record.name[: -len('U1')]}{fit} has" if fit else ""
+        raise InputError.at(
+            record.place,
+            f"{record.name} declares {declared} numbers{other}, and needs {wanted}; {remedy}",
+        )
+    there = len(texts) - before
+    if there != wanted:
+        raise InputError.at(
+            record.place,
+            f"{record.name} has {number_of(max(there, 0), 'number')} behind the {before} values that describe it, "
+            f"where {declared} are declared; {remedy}",
+        )
+    return texts[before:]
+
+
+def _are_counts(texts: Sequence[str]) -> bool:
+    """Return whether values describe a user's model."""
+    whole = len(texts) == _COUNTS and all(text.isdigit() for text in texts)
+    return whole and int(texts[_CONS]) > _HIGHEST_REACTANCE
 
 
 def _motors(

@@ -131,6 +131,58 @@ def test_a_record_that_cannot_be_is_refused_by_its_line(tmp_path, text, told):
     assert told in str(refused.value)
 
 
+def without_value(text, at):
+    """A record without one of its values, counted from its name."""
+    begin, *values = text.split("'CMLDBLU1' ")
+    values = values[0].split()
+    del values[at]
+    return f"{begin}'CMLDBLU1' {' '.join(values)}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (without_value(record(edition="U1"), -2), "131 numbers behind the 7 values"),
+        (without_value(record(edition="U1"), 18), "where 132 are declared"),
+        (record(edition="U1").replace(" 48 ", " 48 0 "), "has 133 numbers behind the 7 values"),
+        (record(edition="U1").replace("U1", "U2"), "declares 132 numbers, as CMLDBLU1 has, and"),
+        (record(edition="U1").replace(" 132 ", " 130 "), "declares 130 numbers, and needs 132"),
+        (record(edition="U1").replace("0.97", "x"), "has 'x' as number"),
+    ],
+)
+def test_a_record_whose_numbers_would_shift_is_refused(tmp_path, text, told):
+    with pytest.raises(InputError, match=r"loads\.dyr, line 1: CMLDBLU[12]") as refused:
+        found(tmp_path, text)
+    assert told in str(refused.value)
+
+
+def test_a_record_without_what_describes_a_users_model_is_the_same(tmp_path):
+    bare = record(edition="U1").replace(EDITIONS["U1"][0], "")
+    named, alone = (found(tmp_path, text).motors for text in (record(edition="U1"), bare))
+    assert [motor.parameters for motor in alone] == [motor.parameters for motor in named]
+
+
+@pytest.mark.parametrize(
+    ("shares", "asks"), [((50, 0, 0, 30, 0), True), ((0.5, 0.4, 0.3, 0, 0), False)]
+)
+def test_shares_in_percent_are_asked_about(tmp_path, shares, asks):
+    with pytest.raises(InputError, match="their sum 1 at most") as refused:
+        found(tmp_path, record(shares=shares))
+    assert ("are they in percent?" in str(refused.value)) is asks
+
+
+@pytest.mark.parametrize(("kind", "count"), [(7, 1), (1, 0), (3, 0)])
+def test_a_motor_of_a_type_that_there_is_not_is_asked_about(tmp_path, kind, count):
+    _, *asked = composite_remarks(found(tmp_path, record(c=[kind, *C[1:]])))
+    told = ["has the type 7 of motor C, which draws 0.05 of the load" in x.text for x in asked]
+    assert told == [True] * count
+
+
+def test_a_composite_load_without_motors_says_so(tmp_path):
+    (remark,) = composite_remarks(found(tmp_path, record(shares=(0, 0, 0, 0.3, 0))))
+    assert "none of motors A to C draws power, motor D" in remark.text
+
+
 def test_the_approximation_is_told(tmp_path):
     (remark,) = composite_remarks(found(tmp_path, record()))
     assert "3 induction motors A to C for 28 MW (bus_2)" in remark.text
