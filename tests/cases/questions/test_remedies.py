@@ -489,6 +489,7 @@ _ELSEWHERE = (
     "write --models phasor, or leave it out",  # tests/cases/new/test_moved_controls.py
     "of a RAW file, and the network is",  # as above
     "a system of its own, with a reference of its own",  # tests/cases/networks/psse/test_studied_parts.py
+    "without which PSS/E refuses the file",  # as above
     "what the control does to a mode",  # tests/cases/networks/psse/test_dc_line_models.py
     "of whose fields no public source has the order",  # tests/cases/networks/psse/test_dyr_converters.py
     "study each on its own",  # tests/cases/networks/cgmes/test_cgmes.py, by the same function

@@ -19,24 +19,37 @@ _SHOWN = 3  # buses that are named; the others are counted
 
 
 @dataclass(frozen=True)
+class SystemApart:
+    """Buses of other parts with machines, to which nothing leads.
+
+    ``fed_mw``: power that is fed there; ``machine_bus``: one with a machine, by which a case chooses its part."""
+
+    buses: frozenset[str] = frozenset()
+    fed_mw: float = 0.0
+    machine_bus: str = ""
+
+
+@dataclass(frozen=True)
 class StudiedPart:
     """One part of a network, and the buses of others, which are left out.
 
-    ``by_dc``: buses to which DC lines lead; ``apart``: buses with a reference of their own, to which nothing leads;
-    ``dead``: buses without a machine, to which nothing leads."""
+    ``by_dc``: buses to which DC lines lead; ``apart``: those of parts with a reference of their own, to which nothing
+    leads; ``unreferred``: those of parts with machines but no reference; ``dead``: buses without a machine, to which
+    nothing leads."""
 
     network: ImportedNetwork
     buses: frozenset[
         str
     ]  # of the part; others that the network has as well are refused by its power flow
     by_dc: frozenset[str] = frozenset()
-    apart: frozenset[str] = frozenset()
+    apart: SystemApart = SystemApart()
+    unreferred: SystemApart = SystemApart()
     dead: frozenset[str] = frozenset()
 
     @property
     def left_buses(self) -> frozenset[str]:
         """Return the buses that are left out."""
-        return self.by_dc | self.apart | self.dead
+        return self.by_dc | self.apart.buses | self.unreferred.buses | self.dead
 
 
 def choose_part(
@@ -45,10 +58,9 @@ def choose_part(
     references: Collection[str],
     slack: str | None = None,
 ) -> StudiedPart:
-    """Return the part with the slack, or else that with machines which has the most buses.
+    """Return the part with the slack, or else of those with machines and a reference the one that has the most buses.
 
-    A part with machines stays if neither a reference nor a DC line tells that it is a system of its own: the power flow
-    then refuses the network, as PSS/E does.
+    Where no part with machines has a reference, that with the most buses is taken. Every other part is left out.
 
     ``references``: the buses that the source names as references, in its order; ``slack``: the bus that a case names as
     its own."""
@@ -57,20 +69,39 @@ def choose_part(
     fed = {part[bus] for bus in network.generation}
     if len(sizes) == 1 or not fed:
         return StudiedPart(network, frozenset(network.buses))
+    referred = {part[bus] for bus in references if bus in part}
+    candidates = sorted(fed & referred or fed)
     studied = (
-        part[slack] if slack in part else max(sorted(fed), key=lambda number: int(sizes[number]))
+        part[slack] if slack in part else max(candidates, key=lambda number: int(sizes[number]))
     )
     joined = _joins(devices, part)
-    referred = {part[bus] for bus in references if bus in part}
     others = {bus: number for bus, number in part.items() if number != studied}
     by_dc = frozenset(bus for bus, number in others.items() if number in joined)
     rest = {bus: number for bus, number in others.items() if bus not in by_dc}
-    apart = frozenset(bus for bus, number in rest.items() if number in fed & referred)
     dead = frozenset(bus for bus, number in rest.items() if number not in fed)
+    with_reference = [bus for bus, number in rest.items() if number in fed & referred]
+    without = [bus for bus, number in rest.items() if number in fed - referred]
     own = next((bus for bus in references if part.get(bus) == studied), None)
-    kept = _without(replace(network, slack=own), by_dc | apart | dead)
-    own_buses = frozenset(bus for bus, number in part.items() if number == studied)
-    return StudiedPart(kept, own_buses, by_dc, apart, dead)
+    found = StudiedPart(
+        network,
+        buses=frozenset(bus for bus, number in part.items() if number == studied),
+        by_dc=by_dc,
+        apart=_apart(network, references, with_reference),
+        unreferred=_apart(network, references, without),
+        dead=dead,
+    )
+    return replace(found, network=_without(replace(network, slack=own), found.left_buses))
+
+
+def _apart(
+    network: ImportedNetwork, references: Collection[str], buses: Collection[str]
+) -> SystemApart:
+    """Return what parts with machines feed, and of the buses that feed it the reference, or that which feeds most."""
+    fed = {bus: feeds.p_mw for bus, feeds in network.generation.items() if bus in buses}
+    if not fed:
+        return SystemApart()
+    named = next((bus for bus in references if bus in fed), max(fed, key=fed.__getitem__))
+    return SystemApart(frozenset(buses), sum(fed.values()), named)
 
 
 def _joins(devices: Sequence[HeldDevice], part: dict[str, int]) -> set[int]:
@@ -119,11 +150,16 @@ def part_notes(part: StudiedPart) -> list[str]:
             f"only DC lines lead to {_names(part.by_dc)}: a part with a frequency of its own, which is left out; the "
             "DC lines feed here what they do at the file's voltages there"
         )
-    if part.apart:
-        bus = min(part.apart)
+    if part.apart.buses:
         found.append(
-            f"no branch leads to {_names(part.apart)}: a system of its own, with a reference of its own, which is left "
-            f"out. To study it instead, name one of its buses with a machine, such as {with_slack(bus)}"
+            f"{_not_joined(part.apart)}: a system of its own, with a reference of its own, which is left out. To study "
+            f"it instead, name one of its buses with a machine, such as {with_slack(part.apart.machine_bus)}"
+        )
+    if part.unreferred.buses:
+        found.append(
+            f"{_not_joined(part.unreferred)}, and none is a reference (IDE = 3), without which PSS/E refuses the file: "
+            "left out. If a branch is open by mistake, close it in the file. To study that part instead, name one of "
+            f"its buses with a machine, such as {with_slack(part.unreferred.machine_bus)}"
         )
     if part.dead:
         found.append(
@@ -131,6 +167,10 @@ def part_notes(part: StudiedPart) -> list[str]:
             "does with what has no reference. If a branch is open by mistake, close it in the file"
         )
     return found
+
+
+def _not_joined(apart: SystemApart) -> str:
+    return f"no branch leads to {_names(apart.buses)}, where machines feed {apart.fed_mw:.4g} MW"
 
 
 def _names(buses: Collection[str]) -> str:

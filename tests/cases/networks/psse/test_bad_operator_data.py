@@ -28,10 +28,6 @@ RAWS = {
         generators(lambda line: line.replace(",1,1,100,", ",1,0,100,")),
         r"grid.raw: no generator is in service",
     ),
-    "parts with machines that nothing joins, of which one has no reference": (
-        raw(33, records(33) | {"TRANSFORMER": records(33)["TRANSFORMER"][:-4]}),
-        r"no way leads to the slack bus 'bus_1' from: 'bus_3'",
-    ),
     "a voltage of zero": (
         changed("BUS", 3, ",1.0,0.0", ",0.0,0.0"),
         r"line 7: VM is 0 pu; it must exceed 0 and",

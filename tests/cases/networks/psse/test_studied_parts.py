@@ -48,7 +48,9 @@ def test_what_no_machine_feeds_is_left_out(read):
 
 def test_a_system_of_its_own_is_left_out_or_studied(read):
     beside = read(with_island(kind=3, machine=True))
-    assert "no branch leads to bus_20: a system of its own" in texts(beside)
+    assert "no branch leads to bus_20, where machines feed 10 MW: a system of its own" in texts(
+        beside
+    )
     assert {*beside.generation} == {"bus_1", "bus_2", "bus_3"}
     assert 'such as slack = "bus_20"' in texts(beside)
     studied = read(with_island(kind=3, machine=True), slack="bus_20")
@@ -56,8 +58,37 @@ def test_a_system_of_its_own_is_left_out_or_studied(read):
     assert read(with_island(kind=3, machine=True), slack="sg20").buses == ("bus_20",)
 
 
-def test_a_machine_apart_without_a_reference_stays_for_the_power_flow_to_refuse(read):
-    assert "bus_20" in read(with_island(kind=2, machine=True)).buses
+def test_machines_apart_without_a_reference_are_left_out_and_asked_about(read):
+    beside = read(with_island(kind=2, machine=True))
+    assert beside.buses == read(records(33)).buses
+    assert "no branch leads to bus_20, where machines feed 10 MW, and none is a reference" in texts(
+        beside
+    )
+    assert 'name one of its buses with a machine, such as slack = "bus_20"' in texts(beside)
+    assert read(with_island(kind=2, machine=True), slack="bus_20").buses == ("bus_20",)
+
+
+def with_reference_in_the_small_part(found):
+    """The records with the system's reference moved to the part of one bus."""
+    found["BUS"] = [row.replace(",16.5,3,", ",16.5,2,") for row in found["BUS"]]
+    return found
+
+
+def test_the_part_with_the_file_s_reference_is_studied_though_another_is_larger(read):
+    found = with_reference_in_the_small_part(with_island(kind=3, machine=True))
+    data = read(found)
+    assert (data.buses, data.slack) == (("bus_20",), "bus_20")
+    # of bus_1 to bus_9 the machine that feeds most is named, and no bus without one
+    assert "bus_1, bus_2, bus_3 and 6 more, where machines feed 319.6 MW" in texts(data)
+    assert 'such as slack = "bus_2"' in texts(data)
+
+
+@pytest.mark.parametrize("slack", ["bus_2", "sg2", "bus_3"])
+def test_the_slack_of_the_case_switches_to_its_part(slack, read):
+    found = with_reference_in_the_small_part(with_island(kind=3, machine=True))
+    data = read(found, slack=slack)
+    assert data.buses == read(records(33)).buses
+    assert "no branch leads to bus_20" in texts(data)
 
 
 def test_the_largest_machine_stands_in_for_a_reference_that_is_missing(read):
