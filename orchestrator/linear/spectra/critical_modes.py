@@ -4,7 +4,8 @@ Around a point σ of the complex plane, Arnoldi's method on (A − σI)⁻¹ fin
 eigenvalues nearer than the farthest one found are then known. Discs around a few points cover the region of the
 critical modes: a range of frequencies, from well into instability to a damping that needs no attention."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy.linalg
@@ -15,7 +16,7 @@ from orchestrator.core.arrays import Vector
 from orchestrator.core.assignment import least_assignment
 from orchestrator.core.errors import AnalysisError
 from orchestrator.core.threads import one_thread
-from orchestrator.linear.models.linear_model import LinearModel
+from orchestrator.linear.models.linear_model import LinearModel, ShiftedSolver
 from orchestrator.linear.spectra import modes as spectra
 from orchestrator.linear.spectra.block_arnoldi import (
     MOST,
@@ -151,13 +152,37 @@ def nearest_pairs(
     return search.pairs(range(count))
 
 
+def eigenvalues_beside(
+    model: LinearModel, known: tuple[Vector, Vector], region: RegionCell
+) -> list[complex]:
+    """All eigenvalues [rad/s] of a region that are none of the known modes.
+
+    ``known``: left eigenvectors as rows and right ones as columns, with products of 1."""
+    return [
+        complex(search.values[k])
+        for search, places in _covered(model, region, known)
+        for k in places
+    ]
+
+
 def _search(
     model: LinearModel, lowest: float, highest: float, damping: float
 ) -> list[spectra.Mode]:
-    """Cover the region with discs. If a disc is too small, find more eigenvalues around its point, or cut the cell."""
     modes: list[spectra.Mode] = []
+    for search, places in _covered(model, RegionCell(lowest, highest, -_UNSTABLE_MARGIN, damping)):
+        modes += search.modes(places)
+    return modes
+
+
+def _covered(
+    model: LinearModel, region: RegionCell, without: tuple[Vector, Vector] | None = None
+) -> "Iterator[tuple[Search, list[int]]]":
+    """Cover the region with discs: searches, each with the places of the eigenvalues that it alone has.
+
+    If a disc is too small, find more eigenvalues around its point, or cut the cell. One search has its vectors at a
+    time."""
     stretch, rooms = _STRETCH, (VectorRoom(), VectorRoom())
-    waiting = [RegionCell(lowest, highest, -_UNSTABLE_MARGIN, damping)]
+    waiting = [region]
     along = _ALONG if model.is_searched_in_blocks else 1.0
     while waiting:
         cell, *rest = waiting.pop().highest(stretch, along)
@@ -166,11 +191,11 @@ def _search(
             raise AnalysisError(
                 f"more than {_AT_A_TIME[1]} modes lie at {cell.centre:.4g} rad/s; compute the full spectrum instead"
             )
-        search, known, values = _searched(model, cell, rooms)
+        search, known = _searched(model, cell, rooms, without)
         if known is None:
             waiting += cell.halves()
         else:
-            modes += search.modes([k for k, value in enumerate(values) if known.holds(value)])
+            yield search, [k for k, value in enumerate(search.values) if known.holds(value)]
             if model.is_searched_in_blocks:
                 stretch = _next_stretch(known, search.vectors_taken)
             for left in cell.beside(known):
@@ -178,7 +203,6 @@ def _search(
                 if both is not None:
                     waiting.pop()
                 waiting.append(both or left)
-    return modes
 
 
 def _next_stretch(known: RegionCell, vectors: int) -> float:
@@ -190,20 +214,41 @@ def _next_stretch(known: RegionCell, vectors: int) -> float:
 
 
 def _searched(
-    model: LinearModel, cell: RegionCell, rooms: tuple[VectorRoom, VectorRoom]
-) -> "tuple[Search, RegionCell | None, NDArray[np.complex128]]":
-    """Search around a cell's centre: the part of the cell in which all is known, None where there is too much, and the
-    eigenvalues around. The point is not on one of them."""
+    model: LinearModel,
+    cell: RegionCell,
+    rooms: tuple[VectorRoom, VectorRoom],
+    without: tuple[Vector, Vector] | None,
+) -> "tuple[Search, RegionCell | None]":
+    """Search around a cell's centre, with the part of the cell in which all is known, None where there is too much.
+
+    The point is not on one of the eigenvalues."""
     for moved in (0.0, 0.02, 0.05):
-        search = Search(model, cell.centre + moved * cell.radius, rooms)
-        known, values = search.covering(cell, (1 + moved) * cell.radius)
+        search = Search(model, cell.centre + moved * cell.radius, rooms, without)
+        known = search.covering(cell, (1 + moved) * cell.radius)
         if (
             known is None
-            or not len(values)
-            or np.abs(values - search.centre).min() > _BESIDE * abs(search.centre)
+            or not len(search.values)
+            or np.abs(search.values - search.centre).min() > _BESIDE * abs(search.centre)
         ):
             break
-    return search, known, values
+    return search, known
+
+
+def _without(solver: ShiftedSolver, known: tuple[Vector, Vector]) -> ShiftedSolver:
+    """The solutions without what is in them of known modes, whose eigenvalues are zeros then.
+
+    ``known``: as `eigenvalues_beside` takes them."""
+    left, right = known
+
+    def rest(vectors: Vector) -> Vector:
+        found: Vector = vectors - right @ (left @ vectors)
+        return found
+
+    return replace(
+        solver,
+        solve=lambda vectors: rest(solver.solve(rest(vectors))),
+        solve_exactly=lambda vectors: rest(solver.solve_exactly(rest(vectors))),
+    )
 
 
 _OFF = 1e-6
@@ -214,15 +259,18 @@ class Search:
     """Arnoldi's method on (A − σI)⁻¹ around one point λ = ``centre``.
 
     ``sigma``: The point in the plane of A's own eigenvalues.
+    ``values``: eigenvalues λ [rad/s] of the last search.
     ``reach``: Distance from ``sigma`` up to which the last search has found every eigenvalue.
 
-    ``rooms``: where right and left vectors stand while they are searched; one search at a time has them."""
+    ``rooms``: where right and left vectors stand while they are searched; one search at a time has them.
+    ``without``: known modes that are not looked for, as `eigenvalues_beside` takes them; no vectors are made then."""
 
     def __init__(
         self,
         model: LinearModel,
         centre: complex,
         rooms: tuple[VectorRoom, VectorRoom] | None = None,
+        without: tuple[Vector, Vector] | None = None,
     ) -> None:
         self._model, self.centre = model, centre
         self._rooms = rooms or (VectorRoom(), VectorRoom())
@@ -233,7 +281,9 @@ class Search:
             except RuntimeError:  # exactly singular, as SuperLU says: the point is an eigenvalue
                 self.sigma += _OFF * max(1.0, abs(self.sigma))
                 self._solver = model.shifted(self.sigma)
-        self._values: NDArray[np.complex128] = np.zeros(0, dtype=complex)
+        if without is not None:
+            self._solver = _without(self._solver, without)
+        self.values: NDArray[np.complex128] = np.zeros(0, dtype=complex)
         self.reach = 0.0
         self._right = np.zeros((len(model.names), 0), dtype=complex)
         self._blocks: BlockArnoldi | None = None
@@ -246,9 +296,9 @@ class Search:
     def nearest(self, count: int, kept: int = _KEPT) -> NDArray[np.complex128]:
         self._blocks = None
         nu, self._right = self._arnoldi(self._solver.solve_exactly, count, kept)
-        self._values = self._to_lambda(nu)
+        self.values = self._to_lambda(nu)
         self.reach = float(1 / np.abs(nu).min())
-        return self._values
+        return self.values
 
     def reaching(
         self, radius: float, wanted: Callable[[complex], bool] = lambda _: True
@@ -261,15 +311,12 @@ class Search:
             return self._found_in_blocks(lambda found: self._knows(found, radius, wanted))
         return self._reaching_one_by_one(radius)
 
-    def covering(
-        self, cell: RegionCell, radius: float
-    ) -> tuple[RegionCell | None, NDArray[np.complex128]]:
-        """Return the part of a cell in which all eigenvalues are known, None where they are too many, and those found.
+    def covering(self, cell: RegionCell, radius: float) -> RegionCell | None:
+        """Return the part of a cell in which all eigenvalues are known; None where they are too many.
 
         ``radius``: distance from ``centre`` within which the whole cell lies [rad/s]."""
         if not self._solver.takes_many:
-            values = self._reaching_one_by_one(radius)
-            return (None, self._values) if values is None else (cell, values)
+            return None if self._reaching_one_by_one(radius) is None else cell
         known: list[RegionCell] = []
         least = _LEAST_PART * _ENOUGH
 
@@ -284,8 +331,7 @@ class Search:
             nearly = share >= _NEARLY and found.count < _MANY
             return part is cell or (much and not nearly)
 
-        values = self._found_in_blocks(is_enough)
-        return (None, self._values) if values is None else (known[-1], values)
+        return None if self._found_in_blocks(is_enough) is None else known[-1]
 
     def _known_part(
         self, blocks: BlockArnoldi, cell: RegionCell, radius: float
@@ -322,12 +368,12 @@ class Search:
             return []
         if self._blocks is not None:
             return self._pairs_of_blocks(self._blocks, list(chosen))
-        nu, left = self._arnoldi(self._solver.solve_adjoint_exactly, len(self._values))
+        nu, left = self._arnoldi(self._solver.solve_adjoint_exactly, len(self.values))
         partners = self._to_lambda(nu.conj())
         return [
             (
-                complex(self._values[k]),
-                left[:, np.argmin(np.abs(partners - self._values[k]))],
+                complex(self.values[k]),
+                left[:, np.argmin(np.abs(partners - self.values[k]))],
                 self._right[:, k],
             )
             for k in chosen
@@ -345,7 +391,7 @@ class Search:
             if not _grow(blocks, enough):
                 return None
             if self._are_complete(blocks):
-                return self._values
+                return self.values
         return None
 
     def _knows(
@@ -364,7 +410,7 @@ class Search:
     def _are_complete(self, blocks: BlockArnoldi) -> bool:
         """Take the eigenvalues up to `reach`; none of them is there so often that there may be more of it."""
         count = int((np.abs(blocks.values) >= 1 / self.reach).sum())
-        self._values = self._to_lambda(blocks.values[:count])
+        self.values = self._to_lambda(blocks.values[:count])
         return blocks.is_complete(count)
 
     def _pairs_of_blocks(

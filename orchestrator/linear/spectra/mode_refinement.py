@@ -6,9 +6,9 @@ model up to the square of what the vectors still lack.
 
 Where the modes of one operating point are made from those of another, a mode that was not critical there, or not there
 at all, is missed. With the known modes projected out, Arnoldi's method around a few points finds what else lies
-nearby; mostly nothing."""
+nearby; mostly nothing. Where many vectors are taken at once it is the search for critical modes itself that does so."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 from orchestrator.core.arrays import Vector
 from orchestrator.core.errors import AnalysisError
 from orchestrator.linear.models.linear_model import LinearModel
-from orchestrator.linear.spectra.modes import damping_ratio, to_continuous
+from orchestrator.linear.spectra.critical_modes import eigenvalues_beside
+from orchestrator.linear.spectra.modes import to_continuous
+from orchestrator.linear.spectra.region_cells import RegionCell
 from orchestrator.linear.spectra.shifted_equations import ShiftedEquations
 
 _ROUNDS = 8
@@ -118,6 +120,9 @@ _AT_A_TIME = (2, 64)
 enough."""
 
 
+_SMALLEST = (
+    1e-4  # smallest size of a part of the region that is cut again, relative to its distance from 0
+)
 _ROUGH = 1e-3  # accuracy of what is found: enough to say whether something is there
 
 
@@ -130,27 +135,30 @@ def misses_modes(
     ``damping``: damping ratio below which nothing may be missed, down to −0.3. What is found is rough."""
     norms = np.einsum("ij,ij->j", known.left.conj(), known.right)
     left = (known.left / norms.conj()).conj().T
+    region = RegionCell(lowest, highest, -_GROWTH, damping)
+    if equations.model.is_searched_in_blocks:
+        return eigenvalues_beside(equations.model, (left, known.right), region)
     edges = np.geomspace(
         lowest, highest, 1 + int(np.ceil(np.log(highest / lowest) / np.log(_STRETCH)))
     ).tolist()
-    slopes = [-ratio / np.sqrt(1 - ratio**2) for ratio in (-_GROWTH, damping)]
+    waiting = [replace(region, low=low, high=high) for low, high in pairwise(edges)]
     found: list[complex] = []
-    for low, high in pairwise(edges):
-        corners = [complex(slope * omega, omega) for slope in slopes for omega in (low, high)]
-        centre = complex(np.mean(corners))
-        radius = max(abs(corner - centre) for corner in corners)
-        for value in _unknown(equations, left, known.right, centre, radius):
-            if low <= value.imag < high and -_GROWTH <= damping_ratio(value) < damping:
-                found.append(value)
+    while waiting:
+        cell = waiting.pop(0)
+        values = _unknown(equations, left, known.right, cell)
+        if values is None:
+            waiting += cell.halves()
+        else:
+            found += [value for value in values if cell.holds(value)]
     return found
 
 
 def _unknown(
-    equations: ShiftedEquations, left: Vector, right: Vector, centre: complex, radius: float
-) -> list[complex]:
-    """All unknown eigenvalues nearer to a point than a radius, and some farther ones."""
-    factors, n = equations.at(centre), right.shape[0]
-    reach = equations.reach(centre, radius)
+    equations: ShiftedEquations, left: Vector, right: Vector, cell: RegionCell
+) -> list[complex] | None:
+    """All unknown eigenvalues of a cell, and some others; None where they are too many for one search."""
+    centre, n = cell.centre, right.shape[0]
+    factors, reach = equations.at(centre), equations.reach(centre, cell.radius)
 
     def solve(vector: Vector) -> Vector:
         rest = vector.reshape(n, 1)
@@ -180,6 +188,8 @@ def _unknown(
         if (1 / np.abs(nu)).max() > reach:
             return [complex(value) for value in values]
         count *= 2
-    raise AnalysisError(
-        f"more than {most} modes lie at {centre:.4g} rad/s; compute the full spectrum instead"
-    )
+    if cell.radius < _SMALLEST * abs(centre):
+        raise AnalysisError(
+            f"more than {most} modes lie at {centre:.4g} rad/s; compute the full spectrum instead"
+        )
+    return None

@@ -66,6 +66,7 @@ _ROUND = 65  # points on a circle whose image is looked at
 
 class ShiftedEquations:
     def __init__(self, model: LinearModel) -> None:
+        self.model = model
         n, self._hub = len(model.names), model.hub
         parts = sp.coo_array(_whole_of(model) if self._hub is None else self._hub.whole)
         size = parts.shape[0]

@@ -273,8 +273,7 @@ def test_a_search_goes_on_where_little_is_left_of_its_cell(share, least, in_bloc
     monkeypatch.setattr(
         search, "_known_part", lambda blocks, *_: looks.append(blocks.count) or part
     )
-    known, _ = search.covering(cell, 2.0)
-    assert known is part
+    assert search.covering(cell, 2.0) is part
     assert looks[-2] < least <= looks[-1] < 1.3 * least
     assert search.vectors_taken == looks[-1]
 

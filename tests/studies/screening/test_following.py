@@ -5,8 +5,10 @@ from functools import cache
 import numpy as np
 import pytest
 
+from orchestrator.linear.models import hub_elimination, linear_model
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.slope_linearization import _Point, linearize_slopes
+from orchestrator.linear.spectra import mode_refinement
 from orchestrator.linear.spectra.critical_modes import DENSE
 from orchestrator.linear.spectra.mode_refinement import RefinedModes, misses_modes, refine
 from orchestrator.linear.spectra.mode_tracking import ModeSet
@@ -104,6 +106,34 @@ def test_a_mode_that_is_not_known_is_found(k):
     assert misses_modes(equations, columns(modes), 0.2 * np.pi, 4 * np.pi, 0.2) == []
     (found,) = misses_modes(equations, columns(without(modes, k)), 0.2 * np.pi, 4 * np.pi, 0.2)
     assert found == pytest.approx(modes.eigenvalues[k], rel=1e-2)
+
+
+@pytest.mark.parametrize("k", range(5))
+def test_a_mode_that_is_not_known_is_found_with_many_vectors_at_once(k, monkeypatch):
+    """As in a large system; what is found has more digits there."""
+    monkeypatch.setattr(hub_elimination, "LEAST_HUB", 50)
+    monkeypatch.setattr(linear_model, "LEAST_IN_BLOCKS", 0)
+    model = system(KNOWN, seed=2)  # whose hub nobody asked for before
+    assert model.is_searched_in_blocks
+    modes, equations = modes_of(model), ShiftedEquations(model)
+    monkeypatch.setattr(mode_refinement, "_unknown", None)  # not one vector at a time
+    assert misses_modes(equations, columns(modes), 0.2 * np.pi, 4 * np.pi, 0.2) == []
+    (found,) = misses_modes(equations, columns(without(modes, k)), 0.2 * np.pi, 4 * np.pi, 0.2)
+    assert found == pytest.approx(modes.eigenvalues[k], rel=1e-6)
+
+
+def test_a_crowd_outside_of_the_region_is_no_end_of_the_search(monkeypatch):
+    """Twelve modes of 25 % damping that nobody knows, four at most around one point: parts are searched."""
+    monkeypatch.setattr(mode_refinement, "_AT_A_TIME", (2, 4))
+    crowd = tuple(complex(-0.26 * w, w) for w in np.linspace(7.2, 8.9, 12))
+    model = system((*KNOWN, *crowd))
+    modes = modes_of(model)
+    critical = np.flatnonzero(-modes.eigenvalues.real < 0.2 * np.abs(modes.eigenvalues))
+    assert len(critical) == len(KNOWN)
+    parts = (x[critical[1:]] for x in (modes.eigenvalues, modes.left, modes.right))
+    known = columns(ModeSet(*parts, names=modes.names))
+    (found,) = misses_modes(ShiftedEquations(model), known, 0.2 * np.pi, 4 * np.pi, 0.2)
+    assert found == pytest.approx(modes.eigenvalues[critical[0]], rel=1e-2)
 
 
 @pytest.mark.parametrize("lost", [0.2 + 4j, 0.01 + 11j, -0.05 + 0.9j])
