@@ -15,8 +15,9 @@ from orchestrator.cases.networks.psse.load_relay_records import (
     is_of,
     load_relays,
 )
-from orchestrator.cases.networks.psse.raw_network import unit_labels
+from orchestrator.cases.networks.psse.raw_network import FileLoad, unit_labels
 from orchestrator.cases.networks.psse.refusals import Refusals
+from orchestrator.cases.networks.psse.relay_doubts import doubts_of_settings, idle_load_relays
 from orchestrator.cases.networks.psse.relay_records import UnitRelay, unit_relays
 from orchestrator.cases.networks.step_ups import shared_branches
 from orchestrator.cases.scenario.measured_points import line_of_numbers
@@ -49,8 +50,12 @@ class TakenRelays:
     unused: Mapping[Place, str] = field(default_factory=dict)
 
 
-def take_relays(draft: Draft, records: Sequence[DynamicRecord]) -> TakenRelays:
-    """Give the draft the relays of its units and loads; a record of none is accounted for."""
+def take_relays(
+    draft: Draft, records: Sequence[DynamicRecord], file_loads: Sequence[FileLoad]
+) -> TakenRelays:
+    """Give the draft the relays of its units and loads; a record of none is accounted for.
+
+    ``file_loads``: of the file, those among them in whose place motors stand."""
     data = draft.data
     if data is None:
         return TakenRelays(frozenset(), {})
@@ -72,11 +77,11 @@ def take_relays(draft: Draft, records: Sequence[DynamicRecord]) -> TakenRelays:
         elif label is None:
             why = f"a relay of the machine {name!r} at bus {bus}, which the RAW file does not have"
             unused[_place(relay.record)] = why
-            _ask_whose(draft, relay.record, why, "the bus or identifier of its machine")
+            _ask_whose(draft, relay.record, why, "correct the bus or identifier of its machine")
         elif bus_name(str(relay.watched)) not in data.buses:
             why = f"a relay of bus {relay.watched}, which is no bus here"
             unused[_place(relay.record)] = why
-            _ask_whose(draft, relay.record, why, "the bus that it watches")
+            _ask_whose(draft, relay.record, why, "correct the bus that it watches")
         else:
             taken.append((label, relay))
     loads = {load.name for load in data.loads}
@@ -86,14 +91,26 @@ def take_relays(draft: Draft, records: Sequence[DynamicRecord]) -> TakenRelays:
         if relay.load.load in loads and bus_name(str(relay.watched)) in data.buses
     ]
     draft.unit_relays, draft.load_relays = taken, of_loads
+    idle = idle_load_relays(
+        records,
+        file_loads,
+        stages,
+        is_motor=lambda load: load not in data.file_loads,
+        is_bus=lambda number: bus_name(str(number)) in data.buses,
+    )
+    for one in idle:
+        unused[_place(one.record)] = one.why
+        if one.remedy:
+            _ask_whose(draft, one.record, one.why, one.remedy)
+    draft.found.questions += doubts_of_settings([relay for _, relay in taken], of_loads)
     used = [*(relay.record for _, relay in taken), *(relay.record for relay in of_loads)]
     return TakenRelays(frozenset(map(_place, used)), unused)
 
 
-def _ask_whose(draft: Draft, record: DynamicRecord, why: str, what: str) -> None:
+def _ask_whose(draft: Draft, record: DynamicRecord, why: str, remedy: str) -> None:
     """Ask about a relay that no run has, as it is of nothing in the network."""
-    text = f"{record.name} is not used: {why}, so that it never trips; correct {what}"
-    topic = QuestionTopic("a relay of nothing in the network", record.name)
+    text = f"{record.name} is not used: {why}, so that it never trips; {remedy}"
+    topic = QuestionTopic("a relay that never trips", record.name)
     draft.found.questions.append(Problem(record.place, text, topic=topic))
 
 

@@ -413,6 +413,7 @@ def _account(
     left = {name.upper() for name in table.dyr_leave_out}
     wanted = [record for record in records if record.name not in left]
     motors, relays, taken = Motors(), TakenRelays(), frozenset[tuple[str, int]]()
+    file_loads = draft.data.file_loads if draft.data else ()
     with refusals.keep():
         motors = take_motors(draft, table, records)
     taken |= take_laws(draft, wanted) | take_frequency(draft, wanted)
@@ -421,7 +422,7 @@ def _account(
     with refusals.keep():
         taken |= take_dc_lines(draft, table, wanted)
     with refusals.keep():
-        relays = take_relays(draft, wanted)
+        relays = take_relays(draft, wanted, file_loads)
     take_wind_turbines(draft, records)
     refusals.tell()
     taken |= relays.places

@@ -103,6 +103,17 @@ def test_at_rest_nothing_trips_and_a_relay_beyond_its_limit_is_asked_about(prepa
     assert not any("VTGTPAT" in question.text for question in left.questions)
 
 
+def test_a_load_relay_of_nothing_is_asked_about_in_the_case(prepared):
+    stages = "0.9 0.5 0.2 0.8 0.5 0.2 0.7 0.5 0.2 0.1"
+    ready = prepared([f"2 'LVSHBL' 9 {stages}", f"2 'LVSHBL' 1 {stages}"])
+    (asked,) = (question.text for question in ready.questions if "LVSHBL" in question.text)
+    assert "not used: a relay of the load '9' at bus 2, which the RAW file does not have" in asked
+    assert "so that it never trips; correct the bus or identifier of its load" in asked
+    (use,) = (use for use in ready.records if use.kind == "LVSHBL" and use.why)
+    assert use.why.startswith("a relay of the load '9' at bus 2")
+    assert [relay.of for relay in ready.relays] == ["load_2"] * 3
+
+
 def test_stages_shed_parts_of_the_load_that_they_name(prepared):
     """Load '1' is 60 of the 80 MW at its bus: two stages of 40 and 30 % leave 80 − 42 MW."""
     record = "2 'LVSHBL' 1 0.8 0.05 0.4 0.8 0.1 0.3 0.3 0.05 0.2 0.02"

@@ -84,6 +84,10 @@ LOAD_RELAYS = (
 )
 
 
+FORM_OF = {name: form for form in LOAD_RELAYS for name in form.names}
+"""The family of a record by its name."""
+
+
 @dataclass(frozen=True)
 class TransferTrip:
     """A part that a relay of a load takes off besides: a machine by bus and identifier, ``"-1"`` for all of the bus,

@@ -1,6 +1,6 @@
 """Records of dynamics data of loads: which one a load follows."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.raw_network import FileLoad
@@ -21,10 +21,27 @@ class RecordsOfLoads:
         """Return the record that names a load, and that goes before others; None where there is none.
 
         ``names``: of the records of a load, an owner, a zone, an area, and of all loads."""
-        numbers = (load.bus, load.owner, load.zone, load.area, None)
-        for name, number in zip(names, numbers, strict=True):
+        for name, number in zip(names, _numbers_of(load), strict=True):
             for identifier in (load.name, _EVERY):
                 record = self._first.get((name, number, identifier))
                 if record is not None:
                     return record
         return None
+
+
+def loads_named(
+    record: DynamicRecord, names: Sequence[str], loads: Iterable[FileLoad]
+) -> Iterator[FileLoad]:
+    """Yield the loads that a record names, whether another goes before it or not.
+
+    ``names``: of the records of a load, an owner, a zone, an area, and of all loads, the record's among them."""
+    level = names.index(record.name)
+    for load in loads:
+        is_of = _numbers_of(load)[level] in (record.bus, None)
+        if is_of and record.machine in (load.name, _EVERY):
+            yield load
+
+
+def _numbers_of(load: FileLoad) -> tuple[int | None, ...]:
+    """Return the numbers by which records name a load, the narrower first."""
+    return load.bus, load.owner, load.zone, load.area, None

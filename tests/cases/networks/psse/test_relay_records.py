@@ -7,6 +7,7 @@ import pytest
 from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.load_relay_records import load_relays
 from orchestrator.cases.networks.psse.raw_network import FileLoad
+from orchestrator.cases.networks.psse.relay_doubts import doubts_of_settings, idle_load_relays
 from orchestrator.cases.networks.psse.relay_records import unit_relays
 from orchestrator.core.errors import InputError
 from orchestrator.systems.coupling.relay_limits import RelayLimits
@@ -122,3 +123,78 @@ def test_a_record_that_cannot_be_is_refused_at_its_line(tmp_path, text, said):
 def test_a_share_beyond_the_whole_load_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"share 1\.5"):
         stages(tmp_path, "1 'LVSHBL' 1 0.9 1 1.5 0 0 0 0 0 0 0")
+
+
+def idle(tmp_path, *texts, motors=(), buses=(1, 2, 3)):
+    """Why relays of loads never trip, and whether that is asked, by the line of the record."""
+    own = records(tmp_path, *texts)
+    found = idle_load_relays(
+        own,
+        LOADS,
+        load_relays(own, [load for load in LOADS if load.load not in motors]),
+        is_motor=lambda load: load.load in motors,
+        is_bus=lambda number: number in buses,
+    )
+    return {one.record.line: (one.why, bool(one.remedy)) for one in found}
+
+
+@pytest.mark.parametrize(
+    ("record", "why"),
+    [
+        ("1 'LVSHBL' 2 ", "the load '2' at bus 1, which the RAW file does not have in service"),
+        ("7 'LDSHBL' * ", "the load '*' at bus 7, which the RAW file does not have in service"),
+        ("9 'LVSHZN' * ", "loads, which the RAW file does not have in service"),
+        ("1 'LVSHBL' 1 99 ", "the load '1' at bus 1 that watches bus 99, which is no bus here"),
+        ("3 'LVSHBL' 1 ", "the load '1' at bus 3, which draws no active power"),
+    ],
+)
+def test_a_relay_of_nothing_is_told_with_its_reason(tmp_path, record, why):
+    assert idle(tmp_path, f"{record}{STAGES}") == {1: (f"a relay of {why}", True)}
+    assert idle(tmp_path, f"1 'LVSHBL' 1 {STAGES}", f"5 'LDSHZN' * {STAGES}") == {}
+
+
+def test_a_relay_beside_another_never_trips(tmp_path):
+    """A second of one load is a slip; where narrower records go before, the file may be meant so."""
+    own = f"1 'LVSHBL' 1 {STAGES}"
+    second = "a second relay of the load '1' at bus 1; the first is in line 1"
+    assert idle(tmp_path, own, own) == {2: (second, True)}
+    others = f"2 'LVSHBL' 1 {STAGES}", f"3 'LVSHBL' 1 {STAGES}"
+    ((line, (why, asked)),) = (
+        (k, x) for k, x in idle(tmp_path, own, *others, f"0 'LVSHAL' * {STAGES}").items() if k > 3
+    )
+    assert (line, asked) == (4, False)
+    assert "narrower records go before it" in why
+
+
+def test_a_relay_whose_load_is_motors_or_that_sheds_nothing_never_trips(tmp_path):
+    own = f"1 'LVSHBL' 1 {STAGES}"
+    ((why, asked),) = idle(tmp_path, own, motors=("load_1",)).values()
+    assert "in whose place induction motors stand" in why
+    ((of_none, also),) = idle(tmp_path, "1 'LVSHBL' 1 0.9 1 0 0.8 1 0 0.7 1 0 0.1").values()
+    assert "no stage has a limit and a share" in of_none
+    assert asked
+    assert also
+
+
+@pytest.mark.parametrize(
+    ("stages_of_record", "said"),
+    [
+        ("0.9 1 0.5 0.88 1 0.5 0.85 1 0.5 0.1", "the shares 0.5, 0.5, 0.5 of its load, 1.5 in all"),
+        ("0.9 1 0.5 0.88 1 0.3 0.85 1 0.2 0.1", ""),
+        ("0.7 1 0.2 0.8 1 0.2 0.9 1 0.2 0.1", "at 0.8 with a delay of 1 s behind one at 0.7"),
+        ("0.7 1 0.2 0.7 2 0.2 0.9 9 0.2 0.1", ""),
+        ("0.9 30 0.2 0.8 30 0.2 0.7 30 0.2 6", "a breaker that takes 6 s"),
+    ],
+)
+def test_settings_of_a_load_relay_that_make_no_sense_are_asked_about(
+    tmp_path, stages_of_record, said
+):
+    found = doubts_of_settings([], stages(tmp_path, f"0 'LVSHAL' * {stages_of_record}"))
+    assert [said in one.text for one in found] == [True] * bool(said)
+
+
+def test_times_of_a_units_relay_in_milliseconds_are_asked_about(tmp_path):
+    own = units(tmp_path, "1 'VTGTPAT' 1 1 '1' 0.8 1.2 100 80", "2 'VTGTPAT' 1 1 '1' 0.8 1.2 100 1")
+    (asked,) = doubts_of_settings(own, [])
+    assert "a breaker that takes 80 s" in asked.text
+    assert "are its times in cycles or milliseconds?" in asked.text
