@@ -31,10 +31,15 @@ def declare_fault(m: ModelBuilder, bus: str, buses: dict[str, Bus]) -> Branch:
 
 
 def fault_admittance(m: ModelBuilder, place: str) -> Phasor:
-    """Declare a fault at a bus or along a line; its admittance is 0 while there is none."""
+    """Declare a fault at a bus; its admittance is 0 while there is none."""
+    return switched_fault_admittance(m, place)[0]
+
+
+def switched_fault_admittance(m: ModelBuilder, place: str) -> tuple[Phasor, Expr]:
+    """Declare a fault at a bus or along a line: its admittance, 0 while there is none, and its switch."""
     R, X, on = _declare_values(m, place, -_LARGEST_CAPACITIVE, _LARGEST_CAPACITIVE)
     m.require(R * R + X * X, f"the fault of {place} has no impedance: give it a reactance")
-    return Phasor(1.0, 0.0) / Phasor(R, X) * on
+    return Phasor(1.0, 0.0) / Phasor(R, X) * on, on
 
 
 def declare_fault_outputs(m: ModelBuilder, bus: str, current: Phasor) -> None:

@@ -1,13 +1,14 @@
 """Lines in networks of phasors that are more than a series impedance: ends that switch one by one, a fault on the way.
 
 Behind the ratio t at the from side the line is a π section with its charging jb at both ends. A fault of admittance y_f
-at the part d of the way leaves, once its inner point is eliminated,
+at the part d of the way makes two of it, each with its own charging, half of it at the fault. Once that inner point is
+eliminated,
 
-    A = y_a − y_a²/S + jb    B = −y_a·y_b/S    D = y_b − y_b²/S + jb
+    A = y_a − y_a²/S + d·jb    B = −y_a·y_b/S    D = y_b − y_b²/S + (1 − d)·jb
 
-with y_a = y/d, y_b = y/(1 − d) and S = y_a + y_b + y_f,
-and without one y, −y, y. An end that is open carries no current: it is eliminated as well, and the line stays charged
-from the other end.
+with y_a = y/d, y_b = y/(1 − d) and S = y_a + y_b + y_f + jb,
+and without one y + jb, −y, y + jb. An end that is open carries no current: it is eliminated as well, and the line stays
+charged from the other end.
 
     i_from = c_f·((A − (1 − c_t)·B²/D)·v_f + c_t·B·v_t)    i_to = c_t·(c_f·B·v_f + (D − (1 − c_f)·B²/A)·v_t)
 
@@ -20,7 +21,7 @@ and of the to end with A and D exchanged. There is no fault along the line meanw
 from dataclasses import dataclass
 
 from fmus.grid.elements import LineValues
-from fmus.grid.fault import fault_admittance
+from fmus.grid.fault import switched_fault_admittance
 from fmus.grid.network import OPEN_CHARGING, Line
 from fmus.toolchain.frames import ZERO, Phasor
 from fmus.toolchain.model_builder import ModelBuilder
@@ -36,7 +37,9 @@ _LEAST = Phasor(1e-12, 0.0)
 
 @dataclass(frozen=True)
 class LineParts:
-    """Admittances of a line behind its ratio, each end's switch, and what a fault along it needs."""
+    """Admittances of a line behind its ratio, each end's switch, and what a fault along it needs.
+
+    ``charging``: that of its from end, which is in A."""
 
     A: Phasor
     B: Phasor
@@ -96,14 +99,15 @@ def declare_line_parts(m: ModelBuilder, line: Line, values: LineValues, y: Phaso
         maximum=1 - _NEAREST,
         tunable=True,
     )
-    y_f = fault_admittance(m, line.name)
-    # of S·d·(1 − d) = y + d·(1 − d)·y_f
-    share = y / (y + y_f * (at * (1 - at)) + _LEAST)
+    y_f, on = switched_fault_admittance(m, line.name)
+    # of S·d·(1 − d) = y + d·(1 − d)·(y_f + jb)
+    share = y / (y + (y_f + jb * on) * (at * (1 - at)) + _LEAST)
     A = y / at - y * share * ((1 - at) / at)
     D = y / (1 - at) - y * share * (at / (1 - at))
     way = share * (1 - at), share * at
-    behind = _behind_poles(A + jb, -(y * share), D + jb, poles)
-    return LineParts(*behind, jb, ends, way=way, fault=y_f)
+    jb_from, jb_to = jb * (1 - on * (1 - at)), jb * (1 - on * at)
+    behind = _behind_poles(A + jb_from, -(y * share), D + jb_to, poles)
+    return LineParts(*behind, jb_from, ends, way=way, fault=y_f)
 
 
 def _behind_poles(

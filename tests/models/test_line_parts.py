@@ -52,12 +52,14 @@ def test_a_whole_line_is_the_same_with_and_without_parts(tap):
 def test_a_fault_along_a_line_is_one_at_a_bus_there(at, z_f, tap):
     values = {"l.fault.on": 1.0, "l.fault.at": at, "l.fault.R": z_f.real, "l.fault.X": z_f.imag}
     found = evaluated(Line("l", "a", "b", **LINE, tap=tap, faulted=True), values)
-    y_a, y_b, b = 1 / (at * Z), 1 / ((1 - at) * Z), 0.5j * B
+    y_a, y_b = 1 / (at * Z), 1 / ((1 - at) * Z)
+    b, rest = 0.5j * B * (1 - OPEN_CHARGING), 0.5j * B * OPEN_CHARGING
+    b_a, b_b = at * b, (1 - at) * b  # each part is a π section with its own charging
     v = solved(
         [
-            [(y_a + b) / tap**2, 0, -y_a / tap],
-            [0, y_b + b, -y_b],
-            [-y_a / tap, -y_b, y_a + y_b + 1 / z_f],
+            [(y_a + b_a + rest) / tap**2, 0, -y_a / tap],
+            [0, y_b + b_b + rest, -y_b],
+            [-y_a / tap, -y_b, y_a + b_a + y_b + b_b + 1 / z_f],
         ]
     )
     assert voltages(found) == pytest.approx(v[:2], rel=1e-8)
@@ -86,8 +88,11 @@ def test_a_fault_on_a_line_that_is_open_at_one_end():
     found = evaluated(Line("l", "a", "b", **LINE, has_ends=True, faulted=True), values)
     b, rest = 0.5j * B * (1 - OPEN_CHARGING), 0.5j * B * OPEN_CHARGING
     y_a, y_b, z_f = 1 / (0.3 * Z), 1 / (0.7 * Z), 0.01 + 1e-5j
-    far = y_b - y_b**2 / (y_b + b)
-    v = solved([[y_a + b + rest, 0, -y_a], [0, rest, 0], [-y_a, 0, y_a + far + 1 / z_f]])
+    b_a, b_b = 0.3 * b, 0.7 * b
+    far = y_b + b_b - y_b**2 / (y_b + b_b)
+    v = solved(
+        [[y_a + b_a + rest, 0, -y_a], [0, rest, 0], [-y_a, 0, y_a + b_a + far + 1 / z_f]],
+    )
     assert voltages(found) == pytest.approx(v[:2], rel=1e-8)
     assert complex(found["l.fault.i_re"], found["l.fault.i_im"]) == pytest.approx(
         v[2] / z_f, rel=1e-8

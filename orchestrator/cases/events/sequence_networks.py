@@ -155,16 +155,16 @@ class SequenceAssembly:
         """Add a π section, or what of it is still joined to a bus."""
         half = 0.5j * B
         is_changed = branch.name == self.changed.line and self.changed.end is None
+        if is_changed and self.changed.at is not None:
+            self._add_split(network, branch, z, half, closed, ratio)
+            return
         ends = (branch.from_bus, abs(ratio) ** 2), (branch.to_bus, 1.0)
         for (bus, square), own, far in zip(ends, closed, reversed(closed), strict=True):
             if not own:
                 continue
             network.add_shunt(bus, half / square)
-            if not far and half and not (is_changed and self.changed.at is not None):
+            if not far and half:
                 network.add_shunt(bus, 1 / (z + 1 / half) / square)
-        if is_changed and self.changed.at is not None:
-            self._add_split(network, branch, z, closed, ratio)
-            return
         if not all(closed) or is_changed:
             return
         network.add_series(branch.from_bus, branch.to_bus, z, ratio)
@@ -174,15 +174,25 @@ class SequenceAssembly:
         network: SequenceNetwork,
         branch: FlowLine,
         z: complex,
+        half: complex,
         closed: tuple[bool, ...],
         ratio: complex,
     ) -> None:
-        """Add both parts of a line with a fault along it, as far as its ends are closed."""
+        """Add both parts of a line with a fault along it, each a π section, or what of it the fault alone feeds.
+
+        ``half``: the charging of one end of the whole line. A line that is open at both ends is away."""
         at = self.changed.at or 0.0
-        if closed[0]:
-            network.add_series(branch.from_bus, FAULT, at * z, ratio)
-        if closed[1]:
-            network.add_series(FAULT, branch.to_bus, (1 - at) * z)
+        ends = (branch.from_bus, ratio), (branch.to_bus, 1.0)
+        if not any(closed):
+            return
+        for (bus, own_ratio), part, own in zip(ends, (at, 1 - at), closed, strict=True):
+            part_z, part_half = part * z, part * half
+            network.add_shunt(FAULT, part_half)
+            if own:
+                network.add_shunt(bus, part_half / abs(own_ratio) ** 2)
+                network.add_series(bus, FAULT, part_z, own_ratio)
+            elif half:
+                network.add_shunt(FAULT, 1 / (part_z + 1 / part_half))
 
     def _zero_line(self, branch: FlowLine, line: Line) -> ZeroLine:
         known = self.data.lines.get(line.name)

@@ -99,10 +99,13 @@ def of_sequences(zero, positive, negative):
 
 
 class Phases:
-    """The ring in phases; a fourth node is the place of a fault along a line."""
+    """The ring in phases; the fourth node is the place of a fault along a line, the fifth the line's open end.
 
-    def __init__(self, emfs, machine, converter, loads):
-        self.Y, self.driven = np.zeros((12, 12), dtype=complex), np.zeros(12, dtype=complex)
+    ``B1``: charging of each line."""
+
+    def __init__(self, emfs, machine, converter, loads, B1=B1):
+        self.Y, self.driven = np.zeros((15, 15), dtype=complex), np.zeros(15, dtype=complex)
+        self.B1 = B1
         for bus, (e, y1), (y2, y0) in (
             (0, machine, (1 / (1.2j * emfs["X_d2"] / 10 + emfs["R_s"] / 10), 1 / (0.08j / 10))),
             (1, converter, (5 / 0.3j, 0.0)),
@@ -139,14 +142,19 @@ class Phases:
             one, other = first, last
             if pole_at is not None and pole_at[0] == name:
                 one, other = self.with_open_pole(first, last, pole_at[1])
-            for bus in (one, other):
-                self.at(bus, bus, of_sequences(0.5j * B0_B1 * B1, 0.5j * B1, 0.5j * B1))
             if split is not None and split[0] == name:
-                if not open_at_from:
-                    self.series(one, 3, split[1] * z)
-                self.series(3, other, (1 - split[1]) * z)
+                start = 4 if open_at_from else one
+                self.section(start, 3, z, split[1])
+                self.section(3, other, z, 1 - split[1])
             else:
-                self.series(one, other, z, name == open_phase)
+                self.section(one, other, z, open_phase=name == open_phase)
+
+    def section(self, one, other, z, part=1.0, *, open_phase=False):
+        """A part of a line of series impedance z, with its own part of the charging, half at each of its ends."""
+        for node in (one, other):
+            y = 0.5j * part * self.B1
+            self.at(node, node, of_sequences(B0_B1 * y, y, y))
+        self.series(one, other, part * z, open_phase)
 
     def with_open_pole(self, one, other, end):
         """Phase a of a line ends before its bus, phases b and c touch it; return the nodes of the line's ends."""
@@ -168,10 +176,18 @@ class Phases:
             pair = np.array([[BOLTED + y, -BOLTED], [-BOLTED, BOLTED]])
         self.Y[np.ix_([b, c], [b, c])] += pair
 
+    def sequences(self, node):
+        """The impedances to earth of a node in the zero, the positive and the negative sequence."""
+        used = [k for k in range(15) if self.Y[k].any()]
+        place = [used.index(3 * node + phase) for phase in range(3)]
+        Z = np.linalg.inv(self.Y[np.ix_(used, used)])[np.ix_(place, place)]
+        T = np.array([[1, 1, 1], [1, A**2, A], [1, A, A**2]])
+        return np.diag(np.linalg.inv(T) @ Z @ T)
+
     def positive(self):
         """The positive sequence of all voltages."""
-        used = [k for k in range(12) if self.Y[k].any()]
-        v = np.zeros(12, dtype=complex)
+        used = [k for k in range(15) if self.Y[k].any()]
+        v = np.zeros(15, dtype=complex)
         v[used] = np.linalg.solve(self.Y[np.ix_(used, used)], self.driven[used])
         return np.array([v[3 * k : 3 * k + 3] @ [1, A, A**2] / 3 for k in range(4)])
 
@@ -181,7 +197,7 @@ def prepared(folder, text, base=RING):
     return load_case(folder / "case.toml").prepare()[0]
 
 
-def compared(ready, time):
+def compared(ready, time, B1=B1):
     """Voltages of the coupled system a step after a time, and what the reference needs to solve the same."""
     with Master(ready.system, ready.schedule, ready.step_size) as master:
         master.run(time, ready.events)
@@ -197,7 +213,7 @@ def compared(ready, time):
     v_0 = ready.power_flow.voltages
     loads = {2: (5 - 0.8j) / abs(v_0["b3"]) ** 2, 1: (2 - 0.4j) / abs(v_0["b2"]) ** 2}
     v = np.array([complex(got[f"{bus}.v_re"], got[f"{bus}.v_im"]) for bus in BUSES])
-    return v, Phases(data, *sources, loads)
+    return v, Phases(data, *sources, loads, B1)
 
 
 @pytest.mark.parametrize("z", [1e-5j, 0.01 + 0.02j])
@@ -223,6 +239,30 @@ def test_a_fault_along_a_line_is_that_of_three_phases(kind, at, tmp_path):
     reference.add_lines(split=("l23", at))
     reference.fault(3, kind, 0.01)
     assert v == pytest.approx(reference.positive()[:3], rel=1e-4)
+
+
+@pytest.mark.parametrize("at", [0.1, 0.6])
+@pytest.mark.parametrize("is_open", [False, True])
+@pytest.mark.parametrize("kind", ["1-phase", "2-phase-earth", "3-phase"])
+def test_each_part_of_a_line_with_a_fault_has_its_own_charging(kind, is_open, at, tmp_path):
+    """Of long lines: the parts are π sections of their own, also that which the fault alone feeds."""
+    B = 0.8
+    trip = '[[events]]\ntype = "line_trip"\ntime = "50 ms"\nline = "l31"\nat = "b3"\n'
+    fault = f'[[events]]\ntype = "line_fault"\ntime = "0.1 s"\nline = "l31"\nat = {at}\nR = 0.01\nX = 0.01\n'
+    text = f'{trip if is_open else ""}{fault}kind = "{kind}"\n'
+    ready = prepared(tmp_path, text, RING.replace("B = 0.04", f"B = {B}"))
+    v, reference = compared(ready, 0.102, B)
+    reference.add_lines(split=("l31", at), open_at_from=is_open)
+    for found in ready.faults:
+        zero, _, negative = reference.sequences(3)
+        assert (found.zero, found.negative) == pytest.approx((zero, negative), rel=1e-9)
+    assert len(ready.faults) == (kind != "3-phase")
+    if kind == "3-phase":
+        reference.at(3, 3, np.eye(3) / (0.01 + 0.01j))
+    else:
+        reference.fault(3, kind, 0.01 + 0.01j)
+    # a thousandth of a line's charging (OPEN_CHARGING) stays at its buses, whatever its state
+    assert v == pytest.approx(reference.positive()[:3], rel=2e-5)
 
 
 def test_an_open_pole_is_that_of_three_phases(tmp_path):
