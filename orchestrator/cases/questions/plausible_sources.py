@@ -160,7 +160,8 @@ def _own_converters(draft: Draft) -> Iterator[UnusualValue]:
         if plan is None or P is None or S_n is None or unit_of(plan, "P_0") != "pu":
             continue
         if port.name in draft.origins:
-            left[port.bus] = left.get(port.bus, 0.0) - P * S_n * (port.bus in left)
+            if port.bus in left:
+                left[port.bus] -= P * S_n
         elif (
             plan.kind == "converter"
             and "P_0" in plan.parameters
