@@ -29,7 +29,7 @@ from orchestrator.core.errors import MOST_PROBLEMS, TOO_MANY, CaseError, InputEr
 from orchestrator.core.foreign_files import check_name, cleaned, steering_in, why_refused
 from orchestrator.core.late import Late
 from orchestrator.core.options import Option
-from orchestrator.core.question_kinds import by_kind
+from orchestrator.core.question_kinds import besides
 from orchestrator.core.toml_files import Table, fault_of, read_toml
 from orchestrator.core.uncollected import uncollected
 from orchestrator.systems.coupling.no_trip_regions import NoTripCode
@@ -146,7 +146,7 @@ class Case(CaseDefinition):
         if not problems:
             problems += self._switched_on(found, parameters, values)
         if problems:
-            raise CaseError(self.source, [*problems, *_besides(problems, questions)])
+            raise CaseError(self.source, [*problems, *besides(problems, questions)])
         if scenarios and self.numbered:
             others = event_tables.other_scenarios(draft, scenarios)
             found[-1] = replace(found[-1], questions=(*found[-1].questions, *others))
@@ -401,23 +401,6 @@ class Case(CaseDefinition):
         self, name: str, overrides: Mapping[str, Value] | None, parameters: Sequence[ParameterFile]
     ) -> Preparer:
         return prepare.Preparer(self, name, dict(overrides or {}), parameters)
-
-
-def _besides(problems: Sequence[Problem], questions: Sequence[Problem]) -> list[Problem]:
-    """Questions beside problems, one of each kind: unusual data may be the reason of the failure."""
-    kind = problems[0].kind  # a question besides is of no kind of its own
-    by_text: dict[str, Problem] = {}
-    for question in questions:
-        by_text.setdefault(question.text, question)
-    return [
-        Problem(
-            by_text[first].place_in_short or by_text[first].place,
-            f"questioned besides: {line}",
-            kind,
-            besides=True,
-        )
-        for first, line in by_kind(by_text).items()
-    ]
 
 
 def _without_outages(overrides: Mapping[str, Value]) -> dict[str, Value]:

@@ -35,6 +35,23 @@ def by_kind(questions: Mapping[str, Problem], command: str = "") -> dict[str, st
     return lines
 
 
+def besides(problems: Sequence[Problem], questions: Sequence[Problem]) -> list[Problem]:
+    """Return questions beside problems, one of each kind: unusual data may be the reason of the failure."""
+    kind = problems[0].kind  # a question besides is of no kind of its own
+    by_text: dict[str, Problem] = {}
+    for question in questions:
+        by_text.setdefault(question.text, question)
+    return [
+        Problem(
+            by_text[first].place_in_short or by_text[first].place,
+            f"questioned besides: {line}",
+            kind,
+            besides=True,
+        )
+        for first, line in by_kind(by_text).items()
+    ]
+
+
 def _with_short_place(line: str, question: Problem, command: str) -> str:
     """Have a line name the first of many records that its question lists, and the command that lists all."""
     if not question.place_in_short or question.place not in line:

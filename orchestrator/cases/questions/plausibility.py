@@ -114,10 +114,11 @@ is started."""
 RESISTANCES = (
     ("transformer.R_t", "transformer.X_t"),
     ("filter.R_c", "filter.X_c"),
+    ("RA", "XA"),
     ("machine.X_d1", "machine.X_q1"),
     ("machine.X_q", "machine.X_d"),
 )
-"""Resistances and reactances, each with a larger one that it should not exceed."""
+"""Resistances and reactances, each with a larger one that it should not exceed; RA and XA are of a motor's stator."""
 
 
 # apparent power [pu of the rating] above which a converter's operating point is questioned

@@ -1,6 +1,8 @@
 """Messages of a component that cannot start, in the words of the case: its place, its operating point, the remedy."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from fnmatch import fnmatchcase
+from itertools import product
 
 from orchestrator.cases.flow.sharing import power_limits
 from orchestrator.cases.new.widened_limits import limits_of_machine
@@ -8,6 +10,7 @@ from orchestrator.cases.scenario.feeding_loads import feeding_loads
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import ComponentError, ErrorKind, Problem, StartError
 from orchestrator.core.options import Option
+from orchestrator.core.question_kinds import besides
 from orchestrator.core.spelling import Text
 from orchestrator.devices.fmi.instance import is_ours
 from orchestrator.devices.fmi.refused_calls import refuses_to_start
@@ -26,7 +29,9 @@ _MOST_OTHERS = 8
 
 
 def start_errors(prepared: PreparedScenario, error: ComponentError) -> StartError | None:
-    """The error of a component that refused to initialise, with those of all other units that do; see `start_error`."""
+    """The error of a component that refused to initialise, with those of all other units that do; see `start_error`.
+
+    The questions about the values of these components stand besides, as such a value is likely the cause."""
     first = start_error(prepared, error)
     if first is None:
         return None
@@ -37,7 +42,7 @@ def start_errors(prepared: PreparedScenario, error: ComponentError) -> StartErro
     ]
     ours = [name for name in units if is_ours(prepared.system.components[name].description.path)]
     refused = {name: refusal_to_start(name, prepared.system.components[name]) for name in ours}
-    others, wider = list[Problem](), [first.wider]
+    others, wider, stopped = list[Problem](), [first.wider], [first.component]
     for name, refusal in refused.items():
         if refusal is None or not refuses_to_start(refusal) or name not in prepared.places:
             continue
@@ -45,6 +50,7 @@ def start_errors(prepared: PreparedScenario, error: ComponentError) -> StartErro
         text = _text(prepared, refusal, name) + _typed(limits)
         others.append(Problem(prepared.places[name], text, ErrorKind.START))
         wider.append(limits)
+        stopped.append(name)
     shown, rest = others[:_MOST_OTHERS], others[_MOST_OTHERS:]
     if rest:
         text = f"scenario {prepared.name!r}: {len(rest)} more units cannot start from their operating point"
@@ -52,7 +58,36 @@ def start_errors(prepared: PreparedScenario, error: ComponentError) -> StartErro
     every = (
         {name: value for limits in wider for name, value in limits.items()} if all(wider) else {}
     )
+    shown += besides(first.problems, _questions_of(prepared, stopped))
     return StartError(prepared.case.source, first.problems[0], first.component, shown, wider=every)
+
+
+def _questions_of(prepared: PreparedScenario, names: Collection[str]) -> list[Problem]:
+    """Return the questions about values of components, that about the value farthest from what is usual first."""
+    excess = dict[Problem, float]()
+    for question in prepared.questions:
+        named = question.topic.variables if question.topic else ()
+        for name, (pattern, _, variable) in product(names, (x.partition(".") for x in named)):
+            if fnmatchcase(name, pattern):
+                found = _excess(prepared.system.components[name], variable)
+                excess[question] = max(found, excess.get(question, 0.0))
+    asked = [question for question, factor in excess.items() if factor]
+    return sorted(asked, key=lambda question: -excess[question])
+
+
+def _excess(plan: ComponentPlan, variable: str) -> float:
+    """Return by what factor a value lies outside of its usual range, at least 1; 0 of what is no value, or a rating.
+
+    A unit that is asked for more than its rating is told with the same figures already."""
+    known = plan.description.variables.get(variable)
+    if known is None or variable == "S_n":
+        return 0.0
+    if known.usual is None:
+        return 1.0
+    value = abs(plan.number(variable))
+    above = value / known.usual.high if known.usual.high > 0 else 1.0
+    below = known.usual.low / value if value > 0 else 1.0
+    return max(1.0, above, below)
 
 
 def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError | None:
