@@ -83,6 +83,15 @@ _MOST_AT_ONCE = 0.75
 
 A right sign leaves 0.03 to 0.65 of it beside most wrong parameters, a sign that stands for a limit 1.1 and more: later
 the limited plant's Q is near the other model's with the sign turned."""
+_FOLLOWED = 0.15
+"""Part of the samples after the event at which the model may follow the recording as it is, not with the sign turned.
+
+Beside plants that came to a limit of the current after a quarter of a second it did at 0.25 to 0.36 of them, beside
+wrong signs and a wrong parameter at 0.07 and less."""
+_FOLLOWS_BETTER = (
+    0.5  # times the error with the sign turned, below which a sample is followed as it is
+)
+_BEYOND_SCATTER = 3.0  # times the scatter that this error has at least
 _LIMITED = 1.0, math.inf
 """Times after the event's begin in which a limit of the current is looked for [s]: a peak makes none in the first."""
 
@@ -294,7 +303,9 @@ def _likeliest(comparison: EventComparison, bases: PortBases, error: float) -> l
             {"reading": best.name, "error": error, "left": trial.rest_of_error, "remedy": remedy},
         )
         for trial in _trials_of(device, event, best, bases)
-        if trial.rest_of_error <= most and (trial.holds_at_once or not _shows_limit(comparison))
+        if trial.rest_of_error <= most
+        and (trial.holds_at_once or not _shows_limit(comparison))
+        and not (best in READINGS_OF_SIGN and _followed_as_it_is(comparison, trial))
     ]
 
 
@@ -403,6 +414,14 @@ class _Trial:
         most = math.hypot(scatter, _MOST_AT_ONCE * rms(moved[first]))
         return rms(error[before]) <= max(least, scatter) and rms(error[first]) <= max(least, most)
 
+    def followed_at(self, played: Complex, event: RecordedEvent, scatter: float) -> float:
+        """Return at which part of the samples after an event a device follows the recording as it is much better."""
+        here = np.abs(self._as_read(played - event.recording.power))
+        turned = np.abs(self._as_read(self.power - self.event.recording.power))
+        better = (here < _FOLLOWS_BETTER * turned) & (turned > _BEYOND_SCATTER * scatter)
+        after = (event.recording.times > event.windows.begin) & event.recording.good
+        return float(better[after].mean())
+
     def _as_read(self, power: Complex) -> Complex:
         """The part of a power that the reading is of: P, Q or both."""
         if self.reading.roles == ("p",):
@@ -410,6 +429,13 @@ class _Trial:
         if self.reading.roles == ("q",):
             return np.asarray(power.imag, dtype=complex)
         return power
+
+
+def _followed_as_it_is(comparison: EventComparison, trial: _Trial) -> bool:
+    """Return whether the device follows the recording as it is for so long that no sign can be wrong."""
+    scatter = math.hypot(*(comparison.noise[one].scatter for one in "pq"))
+    followed = trial.followed_at(comparison.played.power, comparison.event, scatter)
+    return followed > _FOLLOWED
 
 
 def _trials_of(

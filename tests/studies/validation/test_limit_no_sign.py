@@ -25,6 +25,16 @@ def test_a_plant_at_its_limit_beside_a_model_without_it_is_not_asked_for_a_sign(
     assert readings(with_noise(table(plant))) == []
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("every", [1, 20])
+@pytest.mark.parametrize("length", [2.5, 3.0])
+def test_a_plant_that_comes_to_its_limit_later_is_not_asked_for_a_sign(length, every):
+    """In the first quarter of a second it does as the model: no turned sign makes that."""
+    plant = run("pod_p", stop=LENGTH, scale=1.06, gfor__voltage_control__i_q_max=0.96)
+    frame = with_noise(table(plant))
+    assert readings(frame[frame.time <= length].iloc[::every]) == []
+
+
 @pytest.mark.parametrize("every", [1, 20])
 def test_a_wrong_sign_is_asked_about_beside_a_wrong_reactance(every):
     """Q is off at once by more than it moves, and in slow samples by what none of them holds."""
