@@ -33,6 +33,7 @@ from orchestrator.studies.validation.parameters import NEVER
 from orchestrator.studies.validation.plant_out_of_step import plant_loss
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.record import PortBases, Recording, questions_of_level
+from orchestrator.studies.validation.ring_gaps import ask_of_gaps
 from orchestrator.studies.validation.second_event import second_event
 from orchestrator.studies.validation.setpoint import ask_of_setpoint, without_step
 from orchestrator.studies.validation.smoothed import ask_of_smoothing
@@ -164,6 +165,7 @@ def prepare_event(
         windows = replace(windows, second=second)
         figures = {"at": recording.begin + second, "first": recording.begin + windows.begin}
         asked.append(Question(QuestionKind.SECOND_EVENT, figures))
+    asked += ask_of_gaps(recording, windows)
     unique = {one.kind: one for one in reversed(asked)}
     return RecordedEvent(recording, windows, start, tuple(reversed(unique.values())))
 

@@ -19,6 +19,7 @@ from orchestrator.studies.signals.comparison import modes_without_doubts, strong
 from orchestrator.studies.signals.measured import order_of
 from orchestrator.studies.validation.correlation import correlation_length
 from orchestrator.studies.validation.record import Recording
+from orchestrator.studies.validation.ring_gaps import without_gaps
 from orchestrator.studies.validation.shared_modes import shared_modes
 from orchestrator.studies.validation.windows import Windows
 
@@ -458,9 +459,10 @@ def compare_signals(
 ) -> Mapping[str, SignalFigures]:
     """Delay, steps and ring-down of P and Q."""
     measured, own = recording.power, simulated
+    rung = without_gaps(recording, windows)
     found = {}
     for name, y, x in (("p", measured.real, own.real), ("q", measured.imag, own.imag)):
-        compared, strong = _compared_rings(recording, (y, x), windows)
+        compared, strong = _compared_rings(recording, (y, x), rung)
         found[name] = SignalFigures(
             delay_between(recording, y, x, windows),
             (step_of(recording, y, windows), step_of(recording, x, windows)),

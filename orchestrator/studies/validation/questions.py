@@ -31,6 +31,7 @@ class QuestionKind(StrEnum):
     FILLED = "filled samples"
     UNMEASURED = "P or Q missing"
     GAP_AT_EVENT = "gap at the event"
+    GAP_IN_RING_DOWN = "gap in the ring-down"
     LOST_JUMP = "angle lacks a jump"
     LOST_STEP = "magnitude lacks a step"
     ANGLE_JUMP = "angle jumps alone"
@@ -63,6 +64,7 @@ FIGURES_HOLD = {
     QuestionKind.MISSING,
     QuestionKind.MISSING_CODE,
     QuestionKind.FILLED,
+    QuestionKind.GAP_IN_RING_DOWN,
     QuestionKind.SLOW_SAMPLES,
     QuestionKind.NOISE,
     QuestionKind.NO_NOISE,

@@ -175,6 +175,13 @@ def _gap_at_event(x: Figures) -> str:
     )
 
 
+def _gap_in_ring_down(x: Figures) -> str:
+    return (
+        f"samples are missing after the event: the ring-down is that from {x['begin']:.4g} to {x['end']:.4g} s, as a "
+        "straight line between samples rings with nothing"
+    )
+
+
 def _lost_jump(x: Figures) -> str:
     return (
         f"the angle lacks up to {x['jump']:.3g} deg {_smoothed(x)}: was the angle integrated from a filtered "
@@ -341,6 +348,7 @@ RECORDER_SENTENCES: Mapping[QuestionKind, Sentence] = {
     QuestionKind.UNMEASURED: _unmeasured,
     QuestionKind.FILLED: _filled,
     QuestionKind.GAP_AT_EVENT: _gap_at_event,
+    QuestionKind.GAP_IN_RING_DOWN: _gap_in_ring_down,
     QuestionKind.LOST_JUMP: _lost_jump,
     QuestionKind.LOST_STEP: _lost_step,
     QuestionKind.ANGLE_JUMP: _angle_jump,

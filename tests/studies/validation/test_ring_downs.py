@@ -1,6 +1,7 @@
 """Modes of a measured and a simulated ring-down beside each other: what is the model's, and what is the look's."""
 
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,8 +16,9 @@ from orchestrator.studies.validation.limits import (
     _verdict,
 )
 from orchestrator.studies.validation.record import Recording
+from orchestrator.studies.validation.ring_gaps import ask_of_gaps, without_gaps
 from orchestrator.studies.validation.windows import Windows
-from orchestrator.studies.validation.words import open_sentence
+from orchestrator.studies.validation.words import open_sentence, sentence
 
 INTERVAL = 0.02  # of a recorder that sends 50 samples a second [s]
 LENGTH = 8.0  # [s]
@@ -35,10 +37,10 @@ def rings(*modes):
     return 0.9 + found + 0j
 
 
-def compared(measured, simulated):
-    """The figures of P."""
-    everywhere = np.ones(len(TIMES), dtype=bool)
-    recording = Recording(
+def recorded(measured, good=None):
+    """A recording whose voltage rests; ``good``: which of its samples are measured."""
+    everywhere = np.ones(len(TIMES), dtype=bool) if good is None else good
+    return Recording(
         label="rec",
         begin=0.0,
         interval=INTERVAL,
@@ -51,7 +53,11 @@ def compared(measured, simulated):
         average=INTERVAL,
         channels={},
     )
-    return compare_signals(recording, simulated, EVENT)["p"]
+
+
+def compared(measured, simulated, good=None):
+    """The figures of P."""
+    return compare_signals(recorded(measured, good), simulated, EVENT)["p"]
 
 
 def apart(measured, simulated):
@@ -237,3 +243,40 @@ def test_modes_that_one_look_misses_are_met_where_the_difference_is_noise(seed):
     found = criterion(plant, scattering(plant, 3e-4, 100 + seed))
     assert found.verdict is LimitVerdict.MET
     assert found.value < 1
+
+
+def bridged(values, begin, length):
+    """The values with a gap that a straight line bridges, and which of them are measured."""
+    good = (begin >= TIMES) | (begin + length < TIMES)
+    return np.interp(TIMES, TIMES[good], values[good].real) + 0j, good
+
+
+@pytest.mark.parametrize("length", [0.1, 0.25, 0.5])
+@pytest.mark.parametrize("begin", [1.3, 3.4])
+@pytest.mark.parametrize(("hertz", "damping"), [(0.6, 0.08), (1.2, 0.05)])
+def test_samples_in_a_gap_are_left_out_of_a_ring_down(hertz, damping, begin, length):
+    """Bridged by a straight line, 0.25 s made 66 % of 5 %, at 1.2 Hz."""
+    measured, good = bridged(scattering(rings((hertz, damping, 0.05)), 2e-4, seed=1), begin, length)
+    (found, own) = compared(measured, rings((hertz, damping + 0.03, 0.05)), good).modes
+    assert found.damping_percent == pytest.approx(100 * damping, abs=0.2)
+    assert own.damping_percent == pytest.approx(100 * damping + 3, abs=0.2)
+    (asked,) = ask_of_gaps(recorded(measured, good), EVENT)
+    low, high = asked.figures["begin"], asked.figures["end"]
+    assert high <= begin + 2 * INTERVAL or low >= begin + length - INTERVAL
+    assert f"{low:.4g} to {high:.4g} s" in sentence(asked)
+
+
+def test_single_samples_that_are_missing_leave_a_ring_down_whole():
+    good = np.random.default_rng(2).random(len(TIMES)) > 0.05
+    measured = scattering(rings((0.6, 0.08, 0.05)), 2e-4, seed=1)
+    filled = np.interp(TIMES, TIMES[good], measured[good].real) + 0j
+    found, _ = compared(filled, rings((0.6, 0.08, 0.05)), good).modes
+    assert found.damping_percent == pytest.approx(8.0, abs=0.1)
+    assert list(ask_of_gaps(recorded(filled, good), EVENT)) == []
+
+
+def test_a_gap_before_the_event_and_one_after_a_second_leave_a_ring_down_whole():
+    before, late = bridged(rings((0.6, 0.08, 0.05)), 0.5, 0.25)[1], (TIMES <= 6) | (TIMES > 6.5)
+    until = replace(EVENT, second=5.5)
+    assert without_gaps(recorded(rings(), before), EVENT) == EVENT
+    assert without_gaps(recorded(rings(), late), until) == until
