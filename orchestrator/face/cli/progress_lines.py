@@ -9,6 +9,7 @@ from typing import Self
 from rich.console import Console
 
 from orchestrator.face.cli.terminal import make_errors
+from orchestrator.studies.points.doing import doing, tell_doing
 from orchestrator.studies.points.parts_done import parts_done
 
 EVERY = 30.0  # from one line to the next [s]: a log of a night has some hundred
@@ -26,7 +27,7 @@ class ProgressLines:
         self._name, self._counted, self._shown = name, counted, shown
         self._done = self._total = 0
         self._stored: int | None = None  # what was there already when the first count came
-        self._told = -1  # what the line before said is done
+        self._told = -1.0  # what the line before said is done
         self._began, self._ended = monotonic(), Event()
         self._thread = Thread(target=self._say_now_and_then, daemon=True)
 
@@ -37,6 +38,7 @@ class ProgressLines:
         self._done, self._total = done, total
 
     def __enter__(self) -> Self:
+        tell_doing()
         if self._shown:
             self._thread.start()
         return self
@@ -48,24 +50,28 @@ class ProgressLines:
         trace: TracebackType | None,
     ) -> None:
         self._ended.set()
+        tell_doing()
         if self._shown:
             self._thread.join()
 
     def line(self) -> str:
         """Return what is said now; while nothing is done since the line before, how long it takes is not guessed."""
-        passed = monotonic() - self._began
+        passed, now = monotonic() - self._began, doing()
         if not self._total:
             return f"{self._name}: preparing, {_in_words(passed)}"
         stored = self._stored or 0
         # of a task that is under way, some parts may be done; all are not before its record is there
         under_way = min(stored + parts_done(), self._total - 1)
         done = max(self._done, under_way)
-        still, self._told = done == self._told, done
-        at = "still at " if still else ""
-        text = f"{self._name}: {at}{done} of {self._total} {self._counted}, {_in_words(passed)}"
-        if still or done <= stored:
+        reached = done + now.part
+        still, self._told = reached == self._told, reached
+        at, what = "still at " if still else "", f" ({now.text})" if now.text else ""
+        text = (
+            f"{self._name}: {at}{done} of {self._total} {self._counted}{what}, {_in_words(passed)}"
+        )
+        if still or reached <= stored:
             return text
-        left = passed * (self._total - done) / (done - stored)
+        left = passed * (self._total - reached) / (reached - stored)
         return f"{text}, about {_in_words(left)} left"
 
     def _say_now_and_then(self) -> None:

@@ -18,6 +18,7 @@ from orchestrator.studies.coordinated_design.open_loops import PodPlace
 from orchestrator.studies.coordinated_design.settings import PodGroup, SettingSpace
 from orchestrator.studies.pod_design.closed_loop import PodSetting
 from orchestrator.studies.pod_design.lead_lag import angle_deg, compensation_deg
+from orchestrator.studies.points.doing import tell_doing
 from orchestrator.studies.sensitivities.sensitivities import damping_change
 
 # of where the sensitivities are trusted, as parts of the ranges
@@ -66,12 +67,16 @@ class Tried:
 
 
 class SettingSearch:
-    def __init__(self, space: SettingSpace, points: Sequence[RatedPoint]) -> None:
-        self._space, self._points = space, tuple(points)
+    def __init__(
+        self, space: SettingSpace, points: Sequence[RatedPoint], name: str = "search"
+    ) -> None:
+        """``name``: in words, for whoever waits."""
+        self._space, self._points, self._name = space, tuple(points), name
         self.evaluations = 0
 
     def tried(self, x: Numbers, steps: int = 0) -> Tried:
         self.evaluations += 1
+        tell_doing(f"{self._name}, {self.evaluations} settings tried")
         setting = self._space.setting(x)
         return Tried(x, together(point.worth(setting) for point in self._points), steps)
 
@@ -341,7 +346,8 @@ def ranked(
             continue
         group = PodGroup(place.controller, (place.component,), (place.component,), stages[place])
         space = SettingSpace([group], (0.0, largest), frequency)
-        best = SettingSearch(space, points).best(starts=1, polish=False)
+        search = SettingSearch(space, points, f"ranking, {place.name}")
+        best = search.best(starts=1, polish=False)
         found.append(
             RankedConverter(place, shift, space.group_settings(best.x)[0], stages=stages[place])
         )

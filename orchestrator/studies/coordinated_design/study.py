@@ -1,6 +1,6 @@
 """A design over operating points and outages: open loops of all points, the search, and all modes computed anew."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, MISSING, dataclass, replace
 from functools import partial
 from itertools import product
@@ -61,6 +61,7 @@ from orchestrator.studies.pod_design.target import (
     require_controllers,
     with_controller,
 )
+from orchestrator.studies.points.doing import tell_doing
 from orchestrator.studies.points.points import Work, nobody
 from orchestrator.studies.points.request import POINTS_FILE, OverCluster, of_scenario, of_values
 from orchestrator.studies.points.task import StudyCase
@@ -324,11 +325,9 @@ class PointsDesign:
         )
 
 
-def design_over_points(
-    plan: PointsDesignPlan, work: Work, stage: Callable[[str], None] = lambda text: None
-) -> PointsDesign:
+def design_over_points(plan: PointsDesignPlan, work: Work) -> PointsDesign:
     # each point is computed twice, and counted once: half of the count is that without the controllers
-    stage("operating points without the controllers")
+    tell_doing("operating points without the controllers")
     first = replace(work, report=lambda n, of: work.report((n + 1) // 2, of))
     before = modes_at(plan, plan.off, plan.candidates, first)
     usable = [k for k, point in enumerate(before) if point.loops is not None]
@@ -337,7 +336,6 @@ def design_over_points(
             f"no operating point has modes, so nothing can be designed; the first: {before[0].text}"
         )
     frequency = _frequency([before[k] for k in usable])
-    stage("search")
     largest = plan.request.gain_bounds[1]
     own = {place: largest for group in plan.groups for place in group.places}
     rated = [
@@ -347,13 +345,13 @@ def design_over_points(
     ]
     space = SettingSpace(plan.groups, plan.request.gain_bounds, frequency)
     search = SettingSearch(space, rated)
-    best = _search(search, plan, stage)
+    best = _search(search, plan)
     settings, setting = tuple(space.group_settings(best.tried.x)), space.setting(best.tried.x)
-    stage("operating points with the controllers")
+    tell_doing("operating points with the controllers")
     then = replace(work, report=lambda n, of: work.report((of + 1) // 2 + n * (of // 2) // of, of))
     after = modes_at(plan, values_of(plan.groups, settings), (), then)
     after = with_followed_names(plan.aim.names, before, after, setting)
-    stage("ranking")
+    tell_doing("ranking")
     places = [place for group in plan.groups for place in group.places]
     known = None
     if len(places) == 1 and not best.reached:  # the least gain is not the best
@@ -387,16 +385,13 @@ class _BestSettings:
     thin: float | None = None
 
 
-def _search(
-    search: SettingSearch, plan: PointsDesignPlan, stage: Callable[[str], None]
-) -> _BestSettings:
+def _search(search: SettingSearch, plan: PointsDesignPlan) -> _BestSettings:
     """Search for the best settings, and where they give more than is wanted, for the least gain that suffices."""
     wanted, tried, compared = plan.request.damping, search.best(), 0
     if wanted is None:
         return _BestSettings(search.without_idle(tried, None), compared, reached=False)
     enough = wanted + _SPARE
     if not (tried.worth.allowed and tried.worth.worst >= enough):
-        stage("grid of settings, as the search did not reach what is wanted")
         tried, compared = search.over_grid(tried)
     tried = search.without_idle(tried, enough)
     if not (tried.worth.allowed and tried.worth.worst >= enough):
@@ -439,9 +434,12 @@ def _ranking(
     )
     computed = {} if known is None else {known.place: known.points}
     apart, quietly = _apart(alike), replace(work, report=nobody)
-    return best_first(
-        [_confirmed(plan, one, before, computed.get(one.place), apart, quietly) for one in alone]
-    )
+    confirmed = []
+    for one in alone:
+        if one.setting is not None:
+            tell_doing(f"ranking, operating points with {one.place.name} alone")
+        confirmed.append(_confirmed(plan, one, before, computed.get(one.place), apart, quietly))
+    return best_first(confirmed)
 
 
 def _confirmed(

@@ -9,7 +9,9 @@ import pytest
 from orchestrator.cases.case import load_case
 from orchestrator.face.cli import explore, main, progress_lines
 from orchestrator.face.cli.progress_lines import ProgressLines
+from orchestrator.studies.points.doing import tell_doing
 from orchestrator.studies.points.parts_done import counting, join, parts_done, tally, tell_part
+from orchestrator.studies.siting import residues
 from orchestrator.studies.siting.machines import find_machines
 from orchestrator.studies.siting.study import SiteRequest, find_sites
 
@@ -142,6 +144,33 @@ def test_while_nothing_is_done_the_time_left_does_not_grow(monkeypatch):
     now[0] += 30.0
     lines.report(600, 1000)
     assert lines.line() == "run: 600 of 1000 steps, 90 s, about 60 s left"
+
+
+def test_what_is_being_done_is_told_with_its_part_of_the_next_one(monkeypatch):
+    """A search for places stood at "0 of 4 places" while it computed the intact network."""
+    now = [100.0]
+    monkeypatch.setattr(progress_lines, "monotonic", lambda: now[0])
+    with ProgressLines("site", "places", shown=False) as lines:
+        lines.report(0, 4)
+        tell_doing("intact: eigenvalues", 0.25)
+        now[0] += 30.0
+        assert lines.line() == "site: 0 of 4 places (intact: eigenvalues), 30 s, about 7.5 min left"
+        now[0] += 10.0
+        assert lines.line() == "site: still at 0 of 4 places (intact: eigenvalues), 40 s"
+        tell_doing("intact: buses by mode 1 of 2", 0.5)
+        assert lines.line().endswith("(intact: buses by mode 1 of 2), 40 s, about 4.7 min left")
+    assert lines.line() == "site: 0 of 4 places, 40 s"
+
+
+def test_a_search_for_places_tells_what_it_does_and_never_goes_back(monkeypatch):
+    told = []
+    monkeypatch.setattr(residues, "tell_doing", lambda text="", part=0.0: told.append((text, part)))
+    find_sites(load_case("two_area_rms"), SiteRequest("pod_p", scenario="gfor", confirm=0))
+    *parts, last = told
+    assert last == ("", 0.0)
+    assert [part for _, part in parts] == sorted(part for _, part in parts)
+    assert len(parts) >= 4
+    assert all(text.startswith("intact: ") and 0 <= part < 1 for text, part in parts)
 
 
 def test_parts_that_are_told_twice_are_never_all():
