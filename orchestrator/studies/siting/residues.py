@@ -20,6 +20,12 @@ from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.linear.spectra.critical_modes import DENSE
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.studies.modes.modes import ModesResult, modes_from, running
+from orchestrator.studies.points.doing import tell_doing
+
+# Parts of the time that a situation takes, for its progress: measured in 240 buses and 103 machines
+_LINEAR = 0.02  # to the linear model
+_SPECTRUM = 0.15  # its eigenvalues
+_RESIDUES = 0.58  # all modes seen from all buses
 
 _ROUNDS = 12  # substitutions of the eigenvalue into the device's answer, each of which brings the shift nearer
 
@@ -77,10 +83,13 @@ def situation_of(
         )
     outputs = [f"{table.grid}.{bus}.v_{part}" for bus in network.buses for part in ("re", "im")]
     inputs = [f"{table.grid}.{part}" for bus in network.buses for part in injection_names(bus)]
+    tell_doing(f"{name}: steady state and linear model")
     with running(prepared) as master:
         point = find_operating_point(master)
         blocks = Blocks(master, inputs=inputs, outputs=outputs, derivatives=True)
+        tell_doing(f"{name}: eigenvalues", _LINEAR)
         found = modes_from(prepared, master, point, blocks, frequency_range)
+        tell_doing(f"{name}: what each bus does", _LINEAR + _SPECTRUM)
         space = state_space(blocks, master.schedule)
         early = _early(blocks, found.model)
         values = master.components[table.grid].get([name.partition(".")[2] for name in outputs])
@@ -91,10 +100,13 @@ def situation_of(
     labels = [
         text if text not in labels[:k] else f"{text} ({k + 1})" for k, text in enumerate(labels)
     ]
-    seen = [
-        _seen(label, mode, space, found.model, early, network.buses)
-        for label, mode in zip(labels, poor, strict=True)
-    ]
+    seen = []
+    for k, (label, mode) in enumerate(zip(labels, poor, strict=True)):
+        tell_doing(
+            f"{name}: buses by mode {k + 1} of {len(poor)}", 1 - _RESIDUES * (1 - k / len(poor))
+        )
+        seen.append(_seen(label, mode, space, found.model, early, network.buses))
+    tell_doing()
     voltages = {bus: complex(*parts[2 * k : 2 * k + 2]) for k, bus in enumerate(network.buses)}
     return Situation(name, found, tuple(seen), voltages)
 
