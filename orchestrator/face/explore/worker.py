@@ -21,7 +21,7 @@ from orchestrator.cases.questions.idle_values import switches_of, why_idle
 from orchestrator.cases.scenario.service import in_service
 from orchestrator.cases.settings.layers import OptionValues
 from orchestrator.core.arrays import Complex
-from orchestrator.core.errors import CosimError, InputError, few
+from orchestrator.core.errors import CosimError, InputError, StartError, few
 from orchestrator.core.interrupts import calls
 from orchestrator.core.spelling import as_options
 from orchestrator.face.api.case import Case, load
@@ -144,7 +144,9 @@ class Desk:
         name = str(question["scenario"])
         values: dict[str, Value] = dict(question.get("values") or {})
         if ask == "cell":
-            answer: dict[str, Any] = {"values": self._values_of(changed, question, values)}
+            there = self._values_of(changed, question, values)
+            scenario = partial(changed.scenario, name, step=question.get("step"))
+            answer: dict[str, Any] = {"values": there | self._wider(scenario, there, values)}
         elif ask == "save":
             file = explored(changed.file, name, values, question.get("places"))
             answer = {"file": str(saved(original.file, file, _FOLDER))}
@@ -226,6 +228,23 @@ class Desk:
         point = points.setdefault(json.dumps([values, own], sort_keys=True), len(points))
         lost = [name for name in lost if name not in own]
         return preparation.live(Item(point, int(bool(lost)), values, (*own, *lost), tuple(lost)))
+
+    def _wider(
+        self,
+        scenario: Callable[[Mapping[str, Value]], Scenario],
+        there: Mapping[str, Value],
+        varied: Mapping[str, Value],
+    ) -> dict[str, float]:
+        """Limits of exciters and governors with which alone a cell starts, by which its study computed it.
+
+        ``there``: all values of the cell; ``varied``: those of its row and column, which stay."""
+        try:
+            self._bench.master(in_service(scenario(there).prepared))
+        except StartError as error:
+            return {} if error.wider.keys() & varied.keys() else error.wider
+        except CosimError:  # the question about its modes tells it
+            return {}
+        return {}
 
     def _computed(self, scenario: Scenario, frequencies: tuple[float, float]) -> Modes:
         prepared = scenario.prepared

@@ -3,10 +3,11 @@
 PSS/E warns of suspect initial conditions, goes on and drifts to the limit. What is computed here is what `gfor new`
 writes for such an operating point, GridPACK's and PowerWorld's way: the limit lies a little beyond the start."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from orchestrator.cases.form.control_limits import is_wider
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import StartError
 from orchestrator.studies.operating_points.bench import PointBench
 from orchestrator.studies.operating_points.item import Item
@@ -52,12 +53,16 @@ def started(
         if not wider:
             raise
     again = preparation.prepared(item, wider)
-    plans = prepared.scenario.system.components
-    widenings = []
+    return StartedItem(again, bench.master(again.scenario), widenings_of(prepared.scenario, wider))
+
+
+def widenings_of(prepared: PreparedScenario, wider: Mapping[str, float]) -> tuple[Widening, ...]:
+    """Return what wider limits change of a scenario that does not start without them."""
+    plans, found = prepared.system.components, []
     for name, taken in wider.items():
         component, _, variable = name.partition(".")
-        widenings.append(Widening(name, plans[component].number(variable), taken))
-    return StartedItem(again, bench.master(again.scenario), tuple(widenings))
+        found.append(Widening(name, plans[component].number(variable), taken))
+    return tuple(found)
 
 
 def widest(found: Iterable[Widening]) -> dict[str, Widening]:

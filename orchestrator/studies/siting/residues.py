@@ -20,6 +20,7 @@ from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.linear.spectra.critical_modes import DENSE
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.studies.modes.modes import ModesResult, modes_from, running
+from orchestrator.studies.operating_points.widening import Widening
 from orchestrator.studies.points.doing import tell_doing
 
 # Parts of the time that a situation takes, for its progress: measured in 240 buses and 103 machines
@@ -69,6 +70,7 @@ class Situation:
     found: ModesResult
     modes: tuple[SeenMode, ...]
     voltages: Mapping[str, complex]
+    widenings: tuple[Widening, ...] = ()  # limits that were widened so that it starts
 
 
 def situation_of(

@@ -24,7 +24,7 @@ from orchestrator.core.asked import (
     text_or_none,
 )
 from orchestrator.core.asked import positive as above_zero
-from orchestrator.core.errors import CosimError, InputError
+from orchestrator.core.errors import CosimError, InputError, StartError
 from orchestrator.core.options import Option
 from orchestrator.linear.models.linearization import Blocks
 from orchestrator.linear.models.steady_state import find_operating_point
@@ -34,6 +34,7 @@ from orchestrator.studies.operating_points.item import Item
 from orchestrator.studies.operating_points.line_ends import lines_with_ends
 from orchestrator.studies.operating_points.outages import INTACT, read_outages
 from orchestrator.studies.operating_points.preparation import ItemPreparation, failure
+from orchestrator.studies.operating_points.widening import widenings_of
 from orchestrator.studies.points.request import OfCase, of_frequencies, of_scenario, of_values
 from orchestrator.studies.siting import placing
 from orchestrator.studies.siting.candidates import candidates, question_about, unit_terminals
@@ -241,8 +242,7 @@ def find_sites(
         report(k, total)
         item = Item(0, k, {}, outage.elements, outage.elements)
         try:
-            found = preparation.prepared(item).scenario if outage.elements else preparation.base
-            one = situation_of(found, outage.name, request.frequencies, 100 * request.below)
+            one = _situation(preparation, item, outage.name, request)
         except CosimError as error:
             if not outage.elements:
                 raise
@@ -270,6 +270,25 @@ def find_sites(
             Option.BUSES + f": {', '.join(request.buses)}: an outage cuts them off; give others"
         )
     return _with_confirmations(result, scenario, lambda done: report(len(outages) + done, total))
+
+
+def _situation(
+    preparation: ItemPreparation, item: Item, name: str, request: SiteRequest
+) -> Situation:
+    """The network as it is, or after an outage, which is computed with wider limits of exciters and governors where
+    these alone keep it from starting."""
+    asked = (name, request.frequencies, 100 * request.below)
+    if not item.out:
+        return situation_of(preparation.base, *asked)
+    prepared = preparation.prepared(item).scenario
+    try:
+        return situation_of(prepared, *asked)
+    except StartError as error:
+        wider = error.wider
+        if not wider:
+            raise
+    found = situation_of(preparation.prepared(item, wider).scenario, *asked)
+    return replace(found, widenings=widenings_of(prepared, wider))
 
 
 def _shifted(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -358,6 +359,11 @@ def remarks(result: SiteResult) -> list[str]:
             part = f"{100 * shifts[best].part:.1g} % of {strongest}"
             out_of_reach.append((_called(seen), part))
     said += _not_controllable(out_of_reach, best)
+    said += [
+        f"outage {at.name}: {', '.join(map(str, at.widenings))}, so that it starts"
+        for at in result.situations
+        if at.widenings
+    ]
     said += _not_judged(result)
     if result.terminals:
         there = few(result.terminals, _NAMED)
@@ -462,7 +468,9 @@ def _bus_json(result: SiteResult, bus: str, rank: int) -> dict[str, Any]:
 def _outage_json(result: SiteResult, at: Situation) -> dict[str, Any]:
     """Return the modes after an outage, and the best buses for the least damped one."""
     best = _best(result, at.name, at.modes[0].label)
-    return {"outage": at.name, "modes": _modes(at.modes), "best": best}
+    limits = [asdict(one) for one in at.widenings]
+    widened = {"widened_limits": limits} if limits else {}
+    return {"outage": at.name, "modes": _modes(at.modes), "best": best, **widened}
 
 
 def _modes(modes: tuple[SeenMode, ...]) -> list[dict[str, Any]]:

@@ -13,10 +13,12 @@ from orchestrator.cases.form.schema import Value
 from orchestrator.cases.questions.plausibility import overloads
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.scenario.service import in_service
+from orchestrator.core.errors import StartError
 from orchestrator.linear.spectra.mode_tracking import ModeSet
 from orchestrator.studies.black_box.coupled_modes import coupled_with_boxes
 from orchestrator.studies.modes.modes import ModesResult, compute_modes, modes_of
 from orchestrator.studies.operating_points.bench import PointBench
+from orchestrator.studies.operating_points.widening import widenings_of
 from orchestrator.studies.points.executor import Executor, Serial
 from orchestrator.studies.points.failure import Failure
 from orchestrator.studies.points.processes import in_own_worker
@@ -58,7 +60,21 @@ def compute_point(task: SweepPointTask) -> PointRecord:
 
 
 def _modes(task: SweepPointTask, case: Case) -> PointRecord:
+    """The modes, with wider limits of exciters and governors where these alone keep the point from starting; a limit
+    that is varied is what somebody asks about, and stays."""
     prepared = task.study.prepare(case, task.overrides)
+    try:
+        return _at(prepared, task)
+    except StartError as error:
+        wider = error.wider
+        if not wider or wider.keys() & task.overrides.keys():
+            raise
+    record = _at(task.study.prepare(case, {**task.overrides, **wider}), task)
+    told = map(str, widenings_of(prepared, wider))
+    return replace(record, warnings=(*record.warnings, *told))
+
+
+def _at(prepared: PreparedScenario, task: SweepPointTask) -> PointRecord:
     asked = tuple(
         question for question in prepared.questions if question not in prepared.idle.values()
     )

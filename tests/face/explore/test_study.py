@@ -9,11 +9,19 @@ import pandas as pd
 import pytest
 
 import orchestrator as gfor
+from orchestrator.cases.case import load_case
 from orchestrator.face.cli import main
 from orchestrator.face.explore.copied import copied
 from orchestrator.face.explore.server import Explorer
 from orchestrator.face.explore.worker import Desk
+from orchestrator.linear.spectra.modes import damping_ratio
 from orchestrator.output.report.explorer_cells import read_cells
+from orchestrator.studies.points.executor import Serial
+from orchestrator.studies.points.points import Work
+from orchestrator.studies.points.store import PointStore
+from orchestrator.studies.screening.request import ScreeningRequest
+from orchestrator.studies.screening.study import plan_screening, run_screening
+from tests.cases.new.test_widened_limits import new_case
 from tests.face.explore.test_page import (
     browser,
     computed,
@@ -91,6 +99,23 @@ def test_the_live_case_of_each_cell_has_the_modes_of_the_screening(screened):
             seen.append((row["name"], column["name"]))
     # a unit out, and a lost load that others feed less for
     assert {("intact", "late"), ("load_8", "day")} <= set(seen)
+
+
+@pytest.mark.filterwarnings("ignore::orchestrator.face.api.scenario.UnusualDataWarning")
+def test_a_cell_beyond_a_limit_is_opened_with_the_limit_widened_as_the_screening_has_it(tmp_path):
+    path = new_case(tmp_path, exciter="0.05 -5.0 0.9 /")
+    plan = plan_screening(load_case(path), ScreeningRequest(None, "sg3", "base"))
+    items = run_screening(plan, Work(Serial(), PointStore(tmp_path / "points"))).items
+    (item,) = (one for one in items if one.outage.elements)
+    question = {"ask": "cell", "scenario": "base", "own": [], "lost": list(item.outage.elements)}
+    desk = Desk(str(path), False)
+    values = desk.answer(question, print)["values"]
+    assert {one.name: one.taken for one in item.record.widenings}.items() <= values.items()
+    modes = gfor.load(path).scenario("base", values).modes()
+    seen = item.record.eigenvalues[list(item.record.critical)]
+    assert min(mode.damping_percent for mode in modes) == pytest.approx(
+        100 * min(map(damping_ratio, seen)), abs=0.01
+    )
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 """One point of a sweep: what comes back from disk, and what a failure that is nobody's fault leaves behind."""
 
+import re
 from itertools import product
 
 import numpy as np
@@ -16,6 +17,7 @@ from orchestrator.studies.sweep.axes import parse_vary
 from orchestrator.studies.sweep.point import PointRecord, compute_point
 from orchestrator.studies.sweep.request import SweepRequest
 from orchestrator.studies.sweep.sweep import plan_sweep, run_sweep
+from tests.cases.new.test_widened_limits import new_case
 from tests.studies.sweep.sweep_case import two_oscillators
 
 
@@ -148,3 +150,35 @@ def test_a_sweep_in_this_process_stands_on_the_same_fmus_and_closes_them(tmp_pat
     (master,) = opened
     assert all(component._fmu is None for component in master.components.values())
     assert point._bench_here.get() is None
+
+
+@pytest.fixture
+def beyond(tmp_path):
+    """What gives the record of a point whose load asks exciters for more than their limits give."""
+    case = load_case(new_case(tmp_path, exciter="0.05 -5.0 0.9 /"))
+
+    def record(values, *varied):
+        axes = [parse_vary(text) for text in ("grid.load_14.Q=90:100:2", *varied)]
+        plan = plan_sweep(case, SweepRequest(axes, scenarios=["base"], values=values))
+        return compute_point(plan.task(plan.scenarios[0], (0,) * len(axes)))
+
+    return record
+
+
+def test_a_point_beyond_a_limit_is_computed_with_the_limit_widened_and_told(beyond):
+    """As a screening does; the modes are those of the same limits typed."""
+    found = beyond({})
+    assert found.error is None
+    told = [re.fullmatch(r"(\S+) widened from (\S+) to (\S+)", text) for text in found.warnings]
+    limits = {one[1]: float(one[3]) for one in told if one}
+    assert limits
+    assert all(float(one[2]) < float(one[3]) for one in told if one)
+    typed = beyond(limits)
+    assert not [text for text in typed.warnings if "widened from" in text]
+    assert found.modes.eigenvalues == pytest.approx(typed.modes.eigenvalues, rel=1e-6)
+
+
+def test_a_limit_that_is_varied_itself_is_not_widened(beyond):
+    limit = next(text.split()[0] for text in beyond({}).warnings if "widened from" in text)
+    found = beyond({}, f"{limit}=1.2:5:2")
+    assert "cannot start" in found.error
