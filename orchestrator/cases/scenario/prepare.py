@@ -38,6 +38,7 @@ from orchestrator.cases.scenario.case_network import (
 )
 from orchestrator.cases.scenario.catalogue_fmus import PlannedFmu, build_fmu, plan_fmu
 from orchestrator.cases.scenario.drawing_devices import with_motors
+from orchestrator.cases.scenario.motor_relays import check_motor_relays
 from orchestrator.cases.scenario.operating_point import power_flow_of
 from orchestrator.cases.scenario.protection_relays import relays_of
 from orchestrator.cases.scenario.run_plan import (
@@ -313,6 +314,7 @@ class Preparer:
         check_plausibility(draft)
         flow = None if draft.found.problems else power_flow_of(draft)
         question_loading(draft, flow)
+        check_motor_relays(draft, flow)
         draft.found.questions += widened_questions(draft)
         clock = clock_of(draft, step_size)
         told: frozenset[str] = frozenset()

@@ -236,6 +236,23 @@ def test_a_motor_beyond_its_pull_out_point_is_refused_with_its_name(case):
         compute_modes(prepared)
 
 
+def test_a_motor_whose_relay_trips_at_rest_is_refused_with_both_voltages(case):
+    """Its bus rests at the larger root of |V|⁴ + (2 (RP + XQ) − 1) |V|² + |Z|² |S|²."""
+    S = 0.8 + 0.35j
+    half = 0.5 - (LINE.conjugate() * S).real
+    v = np.sqrt(half + np.sqrt(half**2 - abs(LINE * S) ** 2))
+    tripping, resting = (
+        f"2 'CIM5BL' 1 {cim5().replace('0.7 0 0 0', f'0.7 {VI:.4f} 6 3')} /\n"
+        for VI in (v + 0.01, v - 0.01)
+    )
+    with pytest.raises(InputError, match="the undervoltage relay of motor2") as refused:
+        case(tripping)
+    told = f"rests at {v:.4g} pu, below VI = {v + 0.01:.4f} pu, so that it trips 0.15 s after the"
+    assert told in str(refused.value)
+    assert "mill.dyr, line 2" in str(refused.value)
+    assert prepare_one(case(resting), "base").system.components["motor2"].number("TI") == 6
+
+
 def test_a_record_of_a_load_is_no_record_of_the_machine_at_its_bus(case):
     """A machine and a load may have one bus and one identifier."""
     prepared = prepare_one(case(f"1 'CIM5BL' 1 {cim5()} /\n"), "base")
