@@ -32,7 +32,8 @@ class Rule:
     """The parameter ``larger`` must exceed ``smaller``, or at least reach it, or differ from it.
 
     ``needed_with``: a variable that marks the machines whose equations need the rule; at other machines a broken rule
-    is a question. ``only_without``: a variable of machines that the rule is not about."""
+    is a question. ``only_without``: a variable of machines that the rule is not about. ``why_not_equal``: why of two
+    equal values, where that is another reason."""
 
     larger: str
     smaller: str
@@ -41,16 +42,18 @@ class Rule:
     needed_with: str = ""
     only_without: str = ""
     may_be_smaller: bool = False
+    why_not_equal: str = ""
 
     def holds(self, larger: float, smaller: float) -> bool:
         if self.may_be_smaller:
             return abs(larger - smaller) > LEAST_LEAKAGE * larger
         return larger > smaller or (self.may_be_equal and larger == smaller)
 
-    def text(self, larger: str, smaller: str) -> str:
+    def text(self, larger: str, smaller: str, *, are_equal: bool) -> str:
         must = "must not exceed" if self.may_be_equal else "must be less than"
         must = "must differ from" if self.may_be_smaller else must
-        return f"{smaller} {must} {larger}: {self.why}"
+        why = self.why_not_equal if are_equal and self.why_not_equal else self.why
+        return f"{smaller} {must} {larger}: {why}"
 
 
 _FIELD = "what a winding screens, it takes from the reactance; a machine without a field winding is not modelled"
@@ -69,7 +72,8 @@ _CONVERSION = "machine.exact_conversion"
 GENROU and its kin hold without it: each winding has an equation with its own time constant, and X'' > X' or X_l > X''
 give it a negative reactance. PSS/E only warns."""
 
-_LIMITS = "the lower limit exceeds the upper one, or equals it; are the two swapped?"
+_LIMITS = "the lower limit exceeds the upper one; are the two swapped?"
+_EQUAL = "the limits are equal, so that nothing can move between them; correct one"
 LIMITS = (
     ("exciter.E_MAX", "exciter.E_MIN"),
     *((f"exciter.V_{k}MAX", f"exciter.V_{k}MIN") for k in ("R", "A", "I", "M")),
@@ -106,7 +110,7 @@ RULES = (
         "saturation rises with the flux; are the two swapped?",
         may_be_equal=True,
     ),
-    *(Rule(upper, lower, _LIMITS) for upper, lower in LIMITS),
+    *(Rule(upper, lower, _LIMITS, why_not_equal=_EQUAL) for upper, lower in LIMITS),
 )
 """Rules of the machines' data. The FMUs refuse the same data in any tool; here the error names the line, before any FMU
 is started."""
@@ -419,8 +423,10 @@ def _broken_rules(draft: Draft) -> Iterator[tuple[str, Rule, str]]:
     for name, plan in draft.system.components.items():
         for rule in RULES:
             if _breaks(plan, rule):
-                values = (_value_text(plan, v) for v in (rule.larger, rule.smaller))
-                yield name, rule, rule.text(*values)
+                both = (rule.larger, rule.smaller)
+                are_equal = value_of(plan, rule.larger) == value_of(plan, rule.smaller)
+                values = (_value_text(plan, v) for v in both)
+                yield name, rule, rule.text(*values, are_equal=are_equal)
 
 
 def _breaks(plan: ComponentPlan, rule: Rule) -> bool:
