@@ -43,8 +43,16 @@ from orchestrator.cases.networks.psse.dyr_uses import record_uses
 from orchestrator.cases.networks.psse.motor_loads import MotorLoad
 from orchestrator.cases.networks.psse.raw_network import unit_labels
 from orchestrator.cases.networks.psse.refusals import Refusals
+from orchestrator.cases.networks.psse.second_records import (
+    copies_of,
+    question_of_copy,
+    question_of_second,
+    second_load_models,
+    why_a_copy,
+    why_a_second,
+)
 from orchestrator.cases.networks.psse.unused_models import unused_models
-from orchestrator.cases.networks.record_use import UseOfRecord
+from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
 from orchestrator.cases.networks.source_changes import Changes, Remark, kind_of
 from orchestrator.cases.networks.source_ratings import with_needed_ratings
 from orchestrator.cases.networks.unit_row import UnitRow, checked
@@ -302,7 +310,7 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> tuple[list[UnitRow], Sequen
     alphas = _alphas(draft, table, rows)
     replaced = [row.label for row in rows if alphas[row.label] == 1]
     idle = draft.data.idle_machines if draft.data else ()
-    read = with_needed_counts(read_dyr(path))
+    read = with_needed_counts(_without_copies(draft, read_dyr(path)))
     records = named_by_bus(at_their_devices(read, machines), table.dyr_leave_out)
     keys = [(machine.bus, machine.name.strip()) for machine in machines]
     ours = {key for key, row in zip(keys, rows, strict=True) if row.label in table.replace}
@@ -389,6 +397,18 @@ def _parameters(entry: Row, kind: str) -> dict[str, Any]:
     return values
 
 
+def _without_copies(draft: Draft, records: Sequence[DynamicRecord]) -> list[DynamicRecord]:
+    """Return records without copies of others, which are accounted for and asked about."""
+    copies = copies_of(records)
+    for copy, first in copies.items():
+        use = RecordUse(
+            copy.file, copy.line, copy.name, UseOfRecord.NOT_USED, why=why_a_copy(first)
+        )
+        draft.found.records.append(use)
+        draft.found.questions.append(question_of_copy(copy, first))
+    return [record for record in records if record not in copies]
+
+
 def _account(
     draft: Draft,
     table: UnitsTable,
@@ -426,12 +446,11 @@ def _account(
     take_wind_turbines(draft, records)
     refusals.tell()
     taken |= relays.places
-    uses = [
-        replace(use, use=UseOfRecord.USED, why="", of_no_machine=False)
-        if (use.file, use.line) in taken
-        else replace(use, why=relays.unused.get((use.file, use.line), use.why))
-        for use in uses
-    ]
+    seconds = {}
+    for record, first in second_load_models(wanted, taken).items():
+        seconds[record.file, record.line] = why_a_second(record, first)
+        draft.found.questions.append(question_of_second(record, first))
+    uses = [_as_taken(use, taken, seconds, relays.unused) for use in uses]
     draft.found.records += uses
     network = draft.given.case.network
     said = network.load_model if network else None
@@ -440,6 +459,23 @@ def _account(
         records, uses, said, among_phasors=among_phasors, labels=unit_labels(machines)
     )
     return motors.loads
+
+
+def _as_taken(
+    use: RecordUse,
+    taken: Collection[tuple[str, int]],
+    seconds: Mapping[tuple[str, int], str],
+    unused: Mapping[tuple[str, int], str],
+) -> RecordUse:
+    """Return the use of a record whose place may be taken, or have a reason why it is not.
+
+    ``seconds``: reasons of further models of loads; ``unused``: of relays."""
+    place = use.file, use.line
+    if place in taken:
+        return replace(use, use=UseOfRecord.USED, why="", of_no_machine=False)
+    if place in seconds:
+        return replace(use, why=seconds[place], of_no_machine=False)
+    return replace(use, why=unused.get(place, use.why))
 
 
 def _alphas(draft: Draft, table: UnitsTable, rows: Sequence[UnitRow]) -> dict[str, float]:

@@ -134,7 +134,7 @@ def test_voltage_control_is_an_integrator(prepared):
             r"line 6: REECB1 has 29 values, and needs 30: BUSR, PFF",
         ),
         (
-            dyr(plant=record("REGCA1", REGCA1)),
+            dyr(plant=record("REGCA1", REGCA1, Tg=0.03)),
             None,
             r"line 7: a second REGCA1 of machine '1' at bus 3",
         ),

@@ -140,7 +140,7 @@ def test_a_plant_controller_that_is_left_out_is_said(prepared):
             r"machine '1' at bus 3 has records of its electrical and no REGCA1, REGCB1 or REGCC1",
         ),
         (
-            dyr(plant=record("REGCA1", REGCA1)),
+            dyr(plant=record("REGCA1", REGCA1, Tg=0.03)),
             r"line 7: a second converter of machine '1' at bus 3",
         ),
         (
