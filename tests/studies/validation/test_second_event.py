@@ -111,6 +111,16 @@ def test_a_swing_that_grows_from_the_event_on_is_one_event():
     assert named(recorded(lambda t: alone(t, damping=-0.03, size=0.02), dropped)) == []
 
 
+def test_a_mean_that_ends_with_the_recording_is_no_second_event():
+    """The last one is taken over what was there, half of its time: an angle that drifts seems to jump."""
+
+    def drifts(times):
+        middle = np.where(times == times[-1], times - 0.01, times)
+        return alone(middle, damping=0.2) - 0.6 * np.clip(middle - FIRST, 0, None)
+
+    assert named(recorded(drifts, dropped)) == []
+
+
 def test_a_frequency_that_settles_for_seconds_is_one_event():
     def settles(times):
         since = np.clip(times - FIRST, 0, None)
