@@ -13,12 +13,14 @@ from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.flow.source_impedances import source_impedance
 from orchestrator.cases.form.csv_rows import rows_of
 from orchestrator.cases.networks.data import bus_name
+from orchestrator.cases.networks.psse.dyr_mistakes import share_of_power
+from orchestrator.cases.networks.psse.machine_model import STATIC
 from orchestrator.cases.networks.record_use import details, in_one_line
 from orchestrator.cases.new.converter_places import ConverterPlace
 from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.cases.new.widened_limits import HEADROOM, WidenedLimit
 from orchestrator.cases.scenario.prepare import PreparedScenario
-from orchestrator.core.errors import few
+from orchestrator.core.errors import few, number_of
 from orchestrator.core.options import Option
 
 _TEMPLATE = Path(__file__).with_suffix(".txt").read_text(encoding="utf-8")
@@ -102,6 +104,7 @@ class CaseText:
             lines[-1] += (
                 f"; slack {self._wanted.slack}, {self._wanted.frequency} (--slack, --frequency)"
             )
+        lines += self._about_static()
         lines.append(f"loads: {self._loads()}")
         lines += [f"controls: {self._moves()}"] if self._wanted.move_controls else []
         if self.widened:
@@ -147,6 +150,21 @@ class CaseText:
             f"{name}: our grid-forming converter with a droop replaces unit {unit}{fed}; the records of its dynamics "
             "are not used"
         )
+
+    def _about_static(self) -> list[str]:
+        """Tell how much power comes from machines without a record, which are constant currents."""
+        plans = self._base.system.components if self._base else {}
+        fed = dict[str, float]()
+        for port in self._network.ports if self._network else ():
+            plan = plans.get(port.name)
+            if plan is not None and {"P_0", "S_n"} <= plan.description.variables.keys():
+                fed[port.name] = plan.number("P_0") * plan.number("S_n")
+        static = [name for name in fed if plans[name].description.model_name == STATIC]
+        share = share_of_power(sum(fed[name] for name in static), sum(fed.values()))
+        if not static or not share:
+            return []
+        machines = number_of(len(static), "constant current")
+        return [f"machines without a record: {machines}, {share}"]
 
     def _moves(self) -> str:
         """Tell which taps and shunts moved, and that they do after an outage."""

@@ -102,6 +102,21 @@ def test_the_converter_takes_over_what_the_machine_feeds_less(files):
     assert compute_modes(converter).stability.stable
 
 
+def test_how_much_power_comes_from_machines_without_a_record_is_said(files):
+    """In what is assumed and in the question, in MW and in percent of all machines' power."""
+    dyr = files[1]
+    own = [line for line in dyr.read_text().splitlines() if not line.strip().startswith("3 ")]
+    dyr.write_text("\n".join(own) + "\n")
+    case, new = made(files, None, dyr_leave_out=("machine without record",))
+    total = sum(POWERS.values())
+    share = f"{POWERS[3]:.0f} of {total:.0f} MW ({100 * POWERS[3] / total:.1f} %)"
+    assert f"machines without a record: 1 constant current, {share}" in new.assumed
+    (asked,) = (
+        str(q) for q in case.prepare(["base"])[0].questions if "no record of the m" in str(q)
+    )
+    assert f"all such machines feed {share}" in asked
+
+
 @pytest.mark.parametrize(
     ("edit", "asked"),
     [

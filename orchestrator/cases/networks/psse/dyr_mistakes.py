@@ -45,10 +45,11 @@ def records_unfit(
     replaced: Collection[tuple[int, str]],
     labels: Mapping[tuple[int, str], str],
     recorded: Collection[tuple[int, str]],
+    powers: Mapping[tuple[int, str], float],
 ) -> Iterator[str]:
     """Machines whose records are too many or too few.
 
-    ``labels``: of their units; ``recorded``: machines that have records at all."""
+    ``labels``: of their units; ``recorded``: machines that have records at all; ``powers``: of all machines [MW]."""
     for (bus, name), own in parts.items():
         if (bus, name) not in replaced:
             yield from _incomplete(f"machine {name!r} at bus {bus}", own, labels[bus, name])
@@ -59,14 +60,20 @@ def records_unfit(
     partly = [key for key in bare if key in recorded]
     alone = [key for key in bare if key not in recorded]
     if alone:
-        yield _without_records(alone, labels, may_be_static=True)
+        yield _without_records(alone, labels, powers, may_be_static=True)
     if partly:
-        yield _without_records(partly, labels, may_be_static=False)
+        yield _without_records(partly, labels, powers, may_be_static=False)
+
+
+def share_of_power(part: float, total: float) -> str:
+    """Tell how much of the machines' power some of them feed, both in MW; "" where there is none to be a part of."""
+    return f"{part:.0f} of {total:.0f} MW ({100 * part / total:.1f} %)" if total > 0 else ""
 
 
 def _without_records(
     bare: Sequence[tuple[int, str]],
     labels: Mapping[tuple[int, str], str],
+    powers: Mapping[tuple[int, str], float],
     *,
     may_be_static: bool,
 ) -> str:
@@ -74,10 +81,12 @@ def _without_records(
 
     ``may_be_static``: whether they have no records of controls either."""
     (bus, name), *others = bare
-    begin, end = f"machine {name!r} at bus {bus} has no record of a machine; add one", ""
+    share = share_of_power(sum(powers[key] for key in bare), sum(powers.values()))
+    feeding = f", {'which feed' if others else 'which feeds'} {share}" * bool(share)
+    begin, end = f"machine {name!r} at bus {bus} has no record of a machine{feeding}; add one", ""
     if others:
         named = few((f"{name!r} at bus {bus}" for bus, name in bare), _NAMED)
-        begin = f"{len(bare)} machines have no record of a machine ({named}); add them"
+        begin = f"{len(bare)} machines have no record of a machine ({named}){feeding}; add them"
     replaced = [labels[key] for key in bare]
     if may_be_static:
         begin += (

@@ -10,7 +10,7 @@ from orchestrator.cases.form.unusual_value import UnusualValue
 from orchestrator.cases.networks.data import bus_name
 from orchestrator.cases.networks.psse.dyr import machine_models
 from orchestrator.cases.networks.psse.dyr_file import OF_FACTS, DynamicRecord
-from orchestrator.cases.networks.psse.dyr_mistakes import exciter_without_field
+from orchestrator.cases.networks.psse.dyr_mistakes import exciter_without_field, share_of_power
 from orchestrator.cases.networks.psse.dyr_unit_records import COMPENSATORS
 from orchestrator.cases.networks.psse.limiter_records import LIMITERS
 from orchestrator.cases.networks.psse.machine_model import (
@@ -310,6 +310,9 @@ def with_records(
     replaced = {key for key, row in zip(keys, rows, strict=True) if row.label in without}
     models = machine_models(records, machines, leaving_out, replaced, idle, approximate=approximate)
     found = []
+    static = {key for key, model in models.items() if model.converter == STATIC}
+    powers = {key: machine.p_mw for key, machine in zip(keys, machines, strict=True)}
+    share = share_of_power(sum(powers[key] for key in static), sum(powers.values()))
     for key, row in zip(keys, rows, strict=True):
         model = models.get(key)
         if model is None:
@@ -332,16 +335,18 @@ def with_records(
                     converter=model.converter,
                     replaced=model.replaced,
                     measured=model.measured,
-                    doubts=(_doubt_of_static(row),) if model.converter == STATIC else model.doubts,
+                    doubts=(_doubt_of_static(row, share),) if key in static else model.doubts,
                     lines=model.lines,
                 )
             )
     return found
 
 
-def _doubt_of_static(row: UnitRow) -> DoubtOfRecord:
+def _doubt_of_static(row: UnitRow, share: str) -> DoubtOfRecord:
+    """Ask about a machine without a record; ``share``: what all of them feed, in words."""
+    fed = f"; all such machines feed {share}" if share else ""
     text = (
         "no record of the machine, whose power is taken as a constant current (static generation): it holds no voltage "
-        "and adds no inertia; add its records, or name it in [units] replace for a converter of ours"
+        f"and adds no inertia{fed}; add its records, or name it in [units] replace for a converter of ours"
     )
     return DoubtOfRecord("machine", row.place, text, "a machine without a record")

@@ -150,12 +150,14 @@ def test_a_grid_following_unit_is_a_converter_of_the_case(tables):
 
 
 BARE = DYR.replace("3 'GENCLS' 1  2.35 0.0 /", "")
+SHARE = "85 of 320 MW (26.6 %)"  # of 72, 163 and 85 MW
 STATIC = '[units]\ndyr_leave_out = ["machine without record"]'
 
 
 def test_a_machine_without_a_record_may_be_a_constant_current(tables, tmp_path):
     with pytest.raises(CaseError, match="machine '1' at bus 3 has no record") as refused:
         tables(BARE, PHASORS)
+    assert f"no record of a machine, which feeds {SHARE}; add one" in str(refused.value)
     assert "dyr_leave_out = ['machine without record'] in [units]" in str(refused.value)
     assert '`gfor new --dyr-leave-out "machine without record"`' in str(refused.value)
     found = tables(BARE, PHASORS.replace("[units]", STATIC))
@@ -169,6 +171,7 @@ def test_a_machine_without_a_record_may_be_a_constant_current(tables, tmp_path):
         if "no record of the machine" in str(q)
     )
     assert "gfor3: no record of the machine, whose power is taken as a constant current" in asked
+    assert f"adds no inertia; all such machines feed {SHARE}; add its records" in asked
     assert 'meant = ["gfor3.machine"]' in asked
 
 
@@ -184,9 +187,10 @@ def test_only_a_machine_without_any_record_may_be_one(tables):
 def test_many_machines_without_a_record_are_one_problem_with_one_remedy():
     bare = {(bus, "1"): {} for bus in range(1, 12)}
     labels = {(bus, "1"): str(bus) for bus, _ in bare}
-    (said,) = records_unfit(bare, (), labels, ())
+    powers = dict.fromkeys(bare, 10.0) | {(20, "1"): 330.0}
+    (said,) = records_unfit(bare, (), labels, (), powers)
     assert said.startswith("11 machines have no record of a machine ('1' at bus 1, '1' at bus 2, ")
-    assert "'1' at bus 8 and 3 more); add them, or write dyr_leave_out" in said
+    assert "'1' at bus 8 and 3 more), which feed 110 of 440 MW (25.0 %); add them, or write" in said
     assert said.endswith(
         "(`gfor new --replace 1`), and a converter of ours stands there, for the first of them"
     )
