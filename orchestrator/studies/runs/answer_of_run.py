@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import ceil
+from math import ceil, exp
 
 from orchestrator.core.errors import RunInterruptedError, few
 from orchestrator.core.options import Option
@@ -13,6 +13,7 @@ from orchestrator.simulation.watch.finding import (
     EXCURSION,
     INTERRUPTION,
     LIMIT,
+    NOT_JUDGED,
     STALL,
     TRIP,
     Finding,
@@ -41,6 +42,15 @@ _NO_RUN_NEEDED = 4.0
 
 _PERIODS_OF_A_SLOW_GROWTH = 30
 """Periods in which a run shows whether a mode grows that hardly decays."""
+
+_LONGER = 1.5
+"""Part of the time since the last event that a run whose end is not judged goes on to at least."""
+
+_DECAYED = 3.0
+"""Time constants after which a mode leaves 5 %: what moves the response then is no swing that decays."""
+
+_SLOWEST = 0.05
+"""Decay [1/s] at least of a mode whose decay a run is told to wait for: a minute; a slower one is not awaited."""
 
 _TRIPS_NAMED = 2  # trips of relays that an answer names; the others are counted
 
@@ -265,7 +275,8 @@ def _of_an_early_stop(shown: _Response) -> ScenarioAnswer | None:
 def _of_a_response_not_judged(shown: _Response) -> ScenarioAnswer | None:
     if shown.result.stable_in_simulation is not None:
         return None
-    return shown.not_known("not judged throughout; the findings say where and why")
+    longer = _of_a_longer_run(shown)
+    return shown.not_known(f"not judged throughout; the findings say where and why{longer}")
 
 
 def _of_modes_not_known(shown: _Response) -> ScenarioAnswer | None:
@@ -345,6 +356,28 @@ def _seen_from(result: RunResult, mode: Mode | None) -> float:
         return 0.0
     slow = damping is not None and abs(damping) < _UNDECIDED
     return _after(result, swing or mode, _PERIODS_OF_A_SLOW_GROWTH if slow else PERIODS)
+
+
+def _of_a_longer_run(shown: _Response) -> str:
+    """Tell until when a run should go on whose end is not judged, and what is left then; "" where only stretches
+    between events are not."""
+    result = shown.result
+    if all(one.until is not None for one in _of_kind(result, NOT_JUDGED)):
+        return ""
+    last = max((event.time for event in result.modes.prepared.events), default=0.0)
+    longer = last + _LONGER * (shown.end - last)
+    after = result.after if isinstance(result.after, ModesResult) else None
+    mode = shown.by_modes.mode if after is None else _deciding(after)
+    decayed = 0.0
+    if mode is not None and mode.is_oscillation:
+        decayed = last + _DECAYED / max(-mode.eigenvalue.real, _SLOWEST)
+    if mode is None or decayed <= longer:
+        return f"; {Option.STOP} {ceil(longer):g} goes on"
+    left = 100 * exp(mode.eigenvalue.real * (decayed - last))
+    named = f"the least damped mode, {mode.frequency_hz:.3g} Hz with {mode.damping_percent:.2g} %"
+    return (
+        f"; {Option.STOP} {ceil(decayed):g} goes on until {named}, leaves {left:.0f} % of its swing"
+    )
 
 
 def _after(result: RunResult, mode: Mode, periods: float) -> float:

@@ -43,7 +43,7 @@ def test_the_first_screen_of_modes_has_one_line_a_scenario(capsys):
 SPEEDS = ("sg1.machine.omega", "sg2.machine.omega")
 
 
-def result(findings=(), stable=True, events=(1.0,), failure=None, kind=None):
+def result(findings=(), stable=True, events=(1.0,), failure=None, kind=None, stop=5.0):
     shape = np.array([1.0 + 0j, -0.8 + 0j])
     mode = make_mode(-0.2 + 5j, shape / 1.64, shape, SPEEDS)
     case = SimpleNamespace(
@@ -59,7 +59,7 @@ def result(findings=(), stable=True, events=(1.0,), failure=None, kind=None):
     prepared = bare_scenario(
         title="S",
         events=passing,
-        stop_time=5.0,
+        stop_time=stop,
         case=case,
         not_reached=tuple(t for t in events if t >= 5),
     )
@@ -117,6 +117,26 @@ def test_the_verdict_of_a_run_is_its_own(findings, stable, word, remark):
         assert of_run(result(findings, stable, kind="phasor")).remark.endswith(
             "repeat with --set models=emt"
         )
+
+
+@pytest.mark.parametrize(
+    ("until", "stop", "told"),
+    [
+        # exp(-0.2·15) = 5 % of the mode of 0.796 Hz are left 15 s after the event at 1 s
+        (
+            None,
+            5.0,
+            "; --stop 16 goes on until the least damped mode, 0.796 Hz with 4 %, leaves 5 % of its swing",
+        ),
+        (None, 21.0, "; --stop 31 goes on"),  # the mode is gone
+        (3.0, 5.0, "the findings say where and why"),  # between events a longer run shows nothing
+    ],
+)
+def test_a_response_that_is_not_judged_to_its_end_names_the_stop_to_type(until, stop, told):
+    run = result([finding("not_judged", until=until)], stop=stop)
+    answer = of_run(run)
+    assert (answer.verdict, answer.good) == ("not known", None)
+    assert answer.remark.endswith(told)
 
 
 @pytest.mark.parametrize(
