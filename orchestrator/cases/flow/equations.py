@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -90,6 +90,17 @@ class FlowEquations:
             lines=tuple(lines),
             drawn_as_current=current,
             drawn_as_impedance=impedance,
+        )
+
+    def with_shunts(self, shunts: Sequence[FlowShunt]) -> "FlowEquations":
+        """The same equations with further admittances to earth."""
+        at = [self.buses.index(one.bus) for one in shunts]
+        added = [complex(one.g, one.b) for one in shunts]
+        return replace(
+            self,
+            rows=np.append(self.rows, at),
+            columns=np.append(self.columns, at),
+            admittances=np.append(self.admittances, added),
         )
 
     @cached_property

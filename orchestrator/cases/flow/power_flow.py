@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NoReturn
 
 import numpy as np
 
@@ -17,7 +18,8 @@ from orchestrator.cases.flow.balance import (
 from orchestrator.cases.flow.equations import FlowEquations
 from orchestrator.cases.flow.limits import Excess, Limits, exceeded, solve_with_limits
 from orchestrator.cases.flow.newton import CONVERGED, NewtonResult, grow, solve, solve_once
-from orchestrator.core.errors import InputError, PowerFlowError
+from orchestrator.core.errors import InputError, PowerFlowError, few
+from orchestrator.core.options import Option
 
 __all__ = ["FlowLine", "FlowLoad", "FlowShunt", "FlowUnit", "PowerFlow", "solve_power_flow"]
 
@@ -121,17 +123,10 @@ def solve_power_flow(
         final, result, at_limits = solve_with_limits(equations, known)
     else:
         final, result, at_limits = equations, solve_once(equations), []
+    if not result.converged and keep_limits:
+        _refuse_for_limits(equations, known, final, result)
     if not result.converged:
-
-        def with_stray(share: float) -> FlowEquations:
-            fewer = [replace(s, b=share * s.b) if s.stray else s for s in shunts]
-            return FlowEquations.of(
-                buses, lines, drawn, shunts=fewer, active=active, held=held, slack_bus=slack_bus
-            )
-
-        raise PowerFlowError(
-            explain(equations, result, with_stray if any(s.stray for s in shunts) else None)
-        )
+        _refuse(equations, result, shunts)
     voltages = dict(zip(equations.buses, map(complex, result.voltages), strict=True))
     flow = _shares(voltages, nodal_powers(voltages, lines, drawn, shunts), at_bus, slack_bus)
     if not flow.residual <= _TOLERANCE:
@@ -216,6 +211,7 @@ def _shares(
 
 _SHARES = (0.9, 0.75, 0.5, 0.25, 0.0)  # parts of the stray capacitance that are tried
 _SHOWN = 6  # iterations whose mismatch is told
+_EXCEEDING = 5  # buses beyond their limits that are told
 _LITTLE = 0.01  # part of all powers below which they are likely of another unit
 
 
@@ -224,6 +220,46 @@ def explain(
     failed: NewtonResult,
     with_stray: Callable[[float], FlowEquations] | None,
 ) -> str:
+    return (
+        f"{_no_solution(equations, failed)}{_helps(equations, with_stray)}{widest_angle(equations)}"
+    )
+
+
+def _refuse_for_limits(
+    equations: FlowEquations, limits: Limits, final: FlowEquations, failed: NewtonResult
+) -> None:
+    """Refuse limits of reactive power that leave no solution, and tell whose they are, the most exceeded first.
+
+    Nothing is refused where there is none without limits either."""
+    free = solve_once(equations)
+    if not free.converged:
+        return
+    exceeding = exceeded(equations, free.voltages, limits)
+    most = sorted(exceeding, key=lambda one: -abs(one.q - one.limit))
+    told = few([one.text(kept=False) for one in most], _EXCEEDING)
+    raise PowerFlowError(
+        f"{_no_solution(final, failed)}Without limits of reactive power it has a solution, so these are the "
+        f"cause: in it {told}; correct limits that are not meant, or write "
+        "reactive_limits = false in [power_flow] (`gfor new` without "
+        + Option.REACTIVE_LIMITS
+        + ")"
+    )
+
+
+def _refuse(
+    equations: FlowEquations, failed: NewtonResult, shunts: Sequence[FlowShunt]
+) -> NoReturn:
+    """Refuse a network without a solution, with what would give it one."""
+    stray = [one for one in shunts if one.stray]
+
+    def with_stray(share: float) -> FlowEquations:
+        return equations.with_shunts([replace(one, b=(share - 1) * one.b) for one in stray])
+
+    raise PowerFlowError(explain(equations, failed, with_stray if stray else None))
+
+
+def _no_solution(equations: FlowEquations, failed: NewtonResult) -> str:
+    """Return how the iterations end."""
     mismatch, bus = failed.history[-1]
     told = [f"{size * SYSTEM_BASE_MVA:.3g}" for size, _ in failed.history]
     left_out = [] if len(told) <= _SHOWN else ["…"]
@@ -234,8 +270,7 @@ def explain(
         ends = f"collapsed voltages, {abs(failed.voltages[lowest]):.3g} pu at bus {equations.buses[lowest]!r}"
     return (
         f"power flow: no solution found. The iterations end with {ends} "
-        f"(largest mismatch by iteration: {shown}). {_helps(equations, with_stray)}"
-        f"{widest_angle(equations)}"
+        f"(largest mismatch by iteration: {shown}). "
     )
 
 

@@ -184,3 +184,26 @@ def test_a_bus_without_a_way_to_the_slack(units):
             [FlowUnit("u", "a", 100, 0, 1.0), *units],
             "a",
         )
+
+
+def test_limits_that_leave_no_solution_are_named_as_the_cause():
+    """Power far beyond 1/(2X) goes to a bus that is held, but not to one whose unit is at its limit."""
+    line = FlowLine("line", "a", "b", 0.0, X, 0.0)
+    units = [FlowUnit("u", "a", 1e3, 0, 1.0), FlowUnit("w", "b", 1e3, 0, 1.0)]
+    load = FlowLoad("b", 1.5 * 100 / (2 * X), 0)
+
+    def solve(load, limits):
+        return solve_power_flow(
+            ["a", "b"], [line], [load], units, "a", limits=limits, keep_limits=True
+        )
+
+    assert abs(solve(load, {"b": (-9.0, 9.0)}).voltages["b"]) == pytest.approx(1.0)
+    with pytest.raises(InputError) as caught:
+        solve(load, {"b": (-0.1, 0.1)})
+    text = str(caught.value)
+    # Q at both ends is (1 - cos δ)/X with sin δ = 0.75
+    assert f"'b' feeds {100 * (1 - math.sqrt(1 - 0.75**2)) / X:.4g} Mvar, its most being 10" in text
+    assert "so these are the cause" in text
+    assert "the lines cannot carry" not in text
+    with pytest.raises(InputError, match="the lines cannot carry the power"):
+        solve(FlowLoad("b", 2.1 * 100 / (2 * X), 0), {"b": (-0.1, 0.1)})
