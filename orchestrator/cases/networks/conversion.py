@@ -35,7 +35,9 @@ _Value = TypeVar("_Value")
 @dataclass(frozen=True, slots=True)
 class Generation:
     """Total power [MW] and common voltage [pu] of the generators at a bus, a suitable rating [MVA], and their least and
-    most reactive power together [Mvar], infinite where the source has no limit."""
+    most reactive power together [Mvar], infinite where the source has no limit.
+
+    ``is_rated``: whether the rating is the source's; otherwise it is a guess from powers and limits."""
 
     label: str
     p_mw: float
@@ -43,6 +45,7 @@ class Generation:
     rating_mva: float
     q_min_mvar: float = -math.inf
     q_max_mvar: float = math.inf
+    is_rated: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -425,7 +425,8 @@ def _read_from_raw(asked: _Asked) -> _Source:
     with_devices = replace(imported, loads=(*imported.loads, *solved.loads))
     misfit = misfit_of(with_devices, raw.tables.bus, raw.tables.labels, NOT_SOLVED)
     generation = {
-        bus: replace(g, rating_mva=ratings[bus]) for bus, g in imported.generation.items()
+        bus: replace(g, rating_mva=ratings[bus], is_rated=True)
+        for bus, g in imported.generation.items()
     }
     by_model = {(own.section, own.line) for own in modelled}
     records = tuple(_with_words(x, solved, by_model) for x in raw.records)
@@ -491,7 +492,7 @@ def _from_cgmes(path: Path, table: NetworkTable) -> _Source:
     imported = import_network(model.tables)
     ratings = {bus_of(label): rating for label, rating in model.ratings.items()}
     generation = {
-        bus: replace(g, rating_mva=ratings.get(bus, g.rating_mva))
+        bus: replace(g, rating_mva=ratings.get(bus, g.rating_mva), is_rated=bus in ratings)
         for bus, g in imported.generation.items()
     }
     # balances SV's losses

@@ -105,7 +105,7 @@ def start_from_power_flow(
         most = LARGEST_POWER_ON_BASE if name in (ratings or {}) else LARGEST_POWER
         excess = _start_unit(system.components[name], flow.voltages[bus], flow.powers[name], most)
         excesses |= {name: excess} if excess else {}
-    _refuse(excesses)
+    _refuse(excesses, keep_limits=keep_limits)
     for name in (
         unit.name for unit in feeding if not unit.connected and unit.name not in returning
     ):
@@ -310,12 +310,15 @@ def _start_unit(
     return None
 
 
-def _refuse(excesses: Mapping[str, _Excess]) -> None:
-    """Refuse units that cannot be asked for what the power flow gives them, all together."""
+def _refuse(excesses: Mapping[str, _Excess], *, keep_limits: bool) -> None:
+    """Refuse units that cannot be asked for what the power flow gives them, all together.
+
+    ``keep_limits``: whether limits of reactive power are kept, which is then no remedy."""
     if not excesses:
         return
     (name, one), *others = excesses.items()
-    kept = f", or keep its limits: {KEEPING_LIMITS}" * (one.variable == "Q_0")
+    is_remedy = one.variable == "Q_0" and not keep_limits
+    kept = f", or keep its limits: {KEEPING_LIMITS}" * is_remedy
     text = (
         f"{name} would have to feed {one.variable} = {one.value:.4g} pu of its rating, more than {one.most:g}; "
         f"raise its S_n, or move load and generation{kept}"

@@ -72,6 +72,7 @@ from orchestrator.core.errors import InputError, Problem, few
 UNIT_KINDS = ("sg", "gfor")  # first parts of the names of a unit's generator and converter
 _EXCITER = ".exciter"  # end of a scenario's key that names one
 _PHASOR = "_phasor"  # end of the names of phasor models
+_SOURCES = ("raw", "matpower", "pandapower", "cgmes")  # keys of a network's file of another program
 _LIMITS = ("q_min_mvar", "q_max_mvar")
 _REMARKS = ("q_mvar", "name", "comment", "source")
 """Columns that say more to a reader; the power flow computes the reactive power."""
@@ -160,19 +161,39 @@ def _of_parts(generator: str) -> str:
 
 
 def _generation(draft: Draft, table: UnitsTable) -> Mapping[str, Generation]:
-    """Return what the network's source has at each bus, of a RAW file with ratings that fit the power flow."""
-    data, network = draft.data, draft.given.case.network
+    """Return what the network's source has at each bus, without dynamics data with ratings that fit the power flow."""
+    data, network, flow = draft.data, draft.given.case.network, draft.given.case.power_flow
     if data is None or network is None:
         return {}
-    flow = draft.given.case.power_flow
-    if network.raw is None or table.dyr or table.file or not data.misfit or flow is None:
+    is_told = network.raw is not None and (bool(table.file) or not data.misfit)
+    if flow is None or table.dyr or is_told:
+        return data.generation
+    wanted = _without_rating(table, draft.given.directory, data.generation)
+    if not wanted:
         return data.generation
     slack = flow.slack or data.slack or ""
     slack = slack if slack in data.generation else bus_name(slack.removeprefix("sg"))
-    found, text = with_needed_ratings(data, slack)
-    if text:
-        draft.found.questions.append(Problem(draft.given.place("network", "raw"), text))
+    found, texts = with_needed_ratings(
+        data, slack, wanted, keep_limits=flow.reactive_limits is True
+    )
+    source = next(key for key in _SOURCES if getattr(network, key) is not None)
+    place = draft.given.place("network", source)
+    draft.found.questions += [Problem(place, text) for text in texts]
     return found
+
+
+def _without_rating(
+    table: UnitsTable, directory: Path, generation: Mapping[str, Generation]
+) -> Collection[str]:
+    """Return the buses whose rating is that of the network's source."""
+    if table.file is None:
+        return generation
+    rows = _known_rows(seen_from_here(directory / table.file))
+    return {
+        bus_name(row["bus"])
+        for row in rows
+        if not _name_in(row) and optional_number(row, "rating_mva") is None
+    } & generation.keys()
 
 
 def unit_rows(
