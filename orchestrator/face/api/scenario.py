@@ -26,6 +26,7 @@ from orchestrator.core.asked import path as path_of
 from orchestrator.core.attributes import Unchanged
 from orchestrator.core.errors import InputError, Problem
 from orchestrator.core.late import pd, xr
+from orchestrator.core.question_kinds import by_kind
 from orchestrator.face.api.exploration import Exploration, explored
 from orchestrator.face.api.linear import LinearSystem
 from orchestrator.face.api.methods import in_turn, method
@@ -550,6 +551,9 @@ def choose(
 
 
 def question(scenarios: Iterable[PreparedScenario], above: int = 0) -> None:
-    """Warn about data that are most unusual, each once, where the caller of the caller stands, or ``above`` it."""
-    for text in dict.fromkeys(str(one) for prepared in scenarios for one in prepared.questions):
+    """Warn about data that are most unusual, each kind once, where the caller of the caller stands, or ``above`` it.
+
+    `Scenario.questions` has all of them."""
+    asked = {str(one): one for prepared in scenarios for one in prepared.questions}
+    for text in by_kind(asked, "Scenario.questions").values():
         warnings.warn(f"question: {text}", UnusualDataWarning, stacklevel=3 + above)

@@ -140,9 +140,10 @@ def print_questions(
     """Say what the network's files come to, and below the answer, on standard error and once, questions about data that
     are most unusual.
 
-    Of a case file that has not changed, questions that an earlier command has shown are counted in one line.
+    Questions of one kind stand in one line. Of a case file that has not changed, questions that an earlier command has
+    shown are counted in one line.
 
-    ``whole``: whether these are shown again; with ``as_json`` they are."""
+    ``whole``: whether all are shown, one by one; with ``as_json`` those of an earlier command are shown again."""
     from orchestrator.cases.case import BUILT_IN  # noqa: PLC0415 - imports the reading of cases
     from orchestrator.cases.scenario.facts import facts_of  # noqa: PLC0415 - as well
 
@@ -153,18 +154,18 @@ def print_questions(
     asked = list(by_text)
     path = scenarios[0].case.path if asked else None
     if path is None or path.is_relative_to(BUILT_IN):
-        _ask(asked)
+        _ask(asked if whole else by_kind(by_text).values())
         return
     fresh = new_questions(path, asked)
     known = len(asked) - len(fresh)
     command = f"gfor modes {quote(str(path))} --details"
-    if as_json or whole:
+    if whole:
         _ask(asked)
         return
-    named = scenarios[0].names.in_text
-    shown = asked if known < _FEW else fresh
-    _ask(map(named, by_kind({text: by_text[text] for text in shown}, command).values()))
-    if known < _FEW:
+    again = as_json or known < _FEW
+    lines = by_kind({text: by_text[text] for text in (asked if again else fresh)}, command).values()
+    _ask(lines if as_json else map(scenarios[0].names.in_text, lines))
+    if again:
         return
     others = "other " if fresh else ""
     text = f"{known} {others}questions about {path.name} are those of an earlier command"
@@ -172,8 +173,8 @@ def print_questions(
 
 
 def ask(questions: Iterable[Problem]) -> None:
-    """Say questions below the answer, each once."""
-    _ask(dict.fromkeys(map(str, questions)))
+    """Say questions below the answer, each kind once."""
+    _ask(by_kind({str(question): question for question in questions}).values())
 
 
 def _ask(texts: Iterable[str]) -> None:

@@ -23,6 +23,7 @@ from orchestrator.cases.settings.layers import OptionValues
 from orchestrator.core.arrays import Complex
 from orchestrator.core.errors import CosimError, InputError, StartError, few
 from orchestrator.core.interrupts import calls
+from orchestrator.core.question_kinds import by_kind
 from orchestrator.core.spelling import as_options
 from orchestrator.face.api.case import Case, load
 from orchestrator.face.api.results import Modes
@@ -329,12 +330,13 @@ def _parameters(case: Case, scenario: Scenario) -> dict[str, Any]:
 def _questions(scenario: Scenario) -> list[str]:
     """Return what is asked about the scenario's data, without the options that the page does not have."""
     idle = set(scenario.prepared.idle.values())
-    return [
+    asked = {
         question.text
         if question in idle
-        else str(replace(question, place=question.place.removeprefix("--set ")))
+        else str(replace(question, place=question.place.removeprefix("--set "))): question
         for question in scenario.prepared.questions
-    ]
+    }
+    return [*by_kind(asked).values()]
 
 
 def _switches(scenario: Scenario, parameter: str) -> list[str]:
