@@ -91,11 +91,12 @@ def take_relays(
         if relay.load.load in loads and bus_name(str(relay.watched)) in data.buses
     ]
     draft.unit_relays, draft.load_relays = taken, of_loads
+    alone = {(load.bus, load.name) for load in data.file_loads}
     idle = idle_load_relays(
         records,
         file_loads,
         stages,
-        is_motor=lambda load: load not in data.file_loads,
+        is_motor=lambda load: (load.bus, load.name) not in alone,
         is_bus=lambda number: bus_name(str(number)) in data.buses,
     )
     for one in idle:

@@ -1,6 +1,6 @@
 """Records of dynamics data of loads: which one a load follows."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.raw_network import FileLoad
@@ -29,17 +29,23 @@ class RecordsOfLoads:
         return None
 
 
-def loads_named(
-    record: DynamicRecord, names: Sequence[str], loads: Iterable[FileLoad]
-) -> Iterator[FileLoad]:
-    """Yield the loads that a record names, whether another goes before it or not.
+class LoadsOfRecords:
+    """Loads by what of them a record may name."""
 
-    ``names``: of the records of a load, an owner, a zone, an area, and of all loads, the record's among them."""
-    level = names.index(record.name)
-    for load in loads:
-        is_of = _numbers_of(load)[level] in (record.bus, None)
-        if is_of and record.machine in (load.name, _EVERY):
-            yield load
+    def __init__(self, loads: Iterable[FileLoad]) -> None:
+        self._named: dict[tuple[int, int | None, str], list[FileLoad]] = {}
+        for load in loads:
+            for level, number in enumerate(_numbers_of(load)):
+                for identifier in (load.name, _EVERY):
+                    self._named.setdefault((level, number, identifier), []).append(load)
+
+    def of(self, record: DynamicRecord, names: Sequence[str]) -> Sequence[FileLoad]:
+        """Return the loads that a record names, whether another goes before it or not.
+
+        ``names``: of the records of a load, an owner, a zone, an area, and of all loads, the record's among them."""
+        level = names.index(record.name)
+        number = None if record.name == names[-1] else record.bus
+        return self._named.get((level, number, record.machine), ())
 
 
 def _numbers_of(load: FileLoad) -> tuple[int | None, ...]:

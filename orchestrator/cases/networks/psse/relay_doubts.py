@@ -7,7 +7,7 @@ from itertools import pairwise
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.cases.networks.psse.load_relay_records import FORM_OF, LoadRelay
 from orchestrator.cases.networks.psse.raw_network import FileLoad
-from orchestrator.cases.networks.psse.records_of_loads import RecordsOfLoads, loads_named
+from orchestrator.cases.networks.psse.records_of_loads import LoadsOfRecords, RecordsOfLoads
 from orchestrator.cases.networks.psse.relay_records import UnitRelay
 from orchestrator.core.errors import Problem, QuestionTopic
 
@@ -41,7 +41,8 @@ def idle_load_relays(
     which no relay sheds; ``is_bus``: whether a number is of a bus here."""
     own = [record for record in records if record.name in FORM_OF]
     first: dict[tuple[str, int, str], DynamicRecord] = {}
-    of_loads = RecordsOfLoads(own)
+    of_loads, loads_of = RecordsOfLoads(own), LoadsOfRecords(loads)
+    taken = {stage.record: stage for stage in shed}
     for record in own:
         key = record.name, record.bus, record.machine
         before = first.setdefault(key, record)
@@ -49,25 +50,28 @@ def idle_load_relays(
             why = f"a second relay of {_load_in_words(record)}; the first is in line {before.line}"
             yield IdleRelay(record, why, "remove one of the two")
             continue
-        stages = [stage for stage in shed if stage.record is record]
-        why, remedy = _reason(record, loads, of_loads, stages, is_motor=is_motor, is_bus=is_bus)
+        named = loads_of.of(record, FORM_OF[record.name].names)
+        why, remedy = _reason(
+            record, named, of_loads, taken.get(record), is_motor=is_motor, is_bus=is_bus
+        )
         if why:
             yield IdleRelay(record, why, remedy)
 
 
 def _reason(
     record: DynamicRecord,
-    loads: Sequence[FileLoad],
+    named: Sequence[FileLoad],
     of_loads: RecordsOfLoads,
-    stages: Sequence[LoadRelay],
+    stage: LoadRelay | None,
     *,
     is_motor: Callable[[FileLoad], bool],
     is_bus: Callable[[int], bool],
 ) -> tuple[str, str]:
-    """Return why a relay never trips, and the remedy; nothing where it may."""
+    """Return why a relay never trips, and the remedy; nothing where it may.
+
+    ``named``: the loads that its record names; ``stage``: one of its stages."""
     names = FORM_OF[record.name].names
     of = f"a relay of {_load_in_words(record)}"
-    named = list(loads_named(record, names, loads))
     if not named:
         why = f"{of}, which the RAW file does not have in service"
         return why, "correct the bus or identifier of its load"
@@ -79,11 +83,10 @@ def _reason(
         return why, "leave out the motors' record, or this one"
     if all(load.p_mw <= 0 for load in followed):
         return f"{of}, which draws no active power", "correct the bus or identifier of its load"
-    if not stages:
+    if stage is None:
         return f"{of}, of which no stage has a limit and a share", "correct its stages"
-    watched = stages[0].watched
-    if not is_bus(watched):
-        return f"{of} that watches bus {watched}, which is no bus here", (
+    if not is_bus(stage.watched):
+        return f"{of} that watches bus {stage.watched}, which is no bus here", (
             "correct the bus that it watches"
         )
     return "", ""
