@@ -39,7 +39,14 @@ from orchestrator.linear.spectra.modes import (
     find_spectrum,
 )
 from orchestrator.linear.spectra.slowest_decay import Decay
-from orchestrator.linear.spectra.stability import WHOLE, Cause, Stability, judge, whole_spectrum
+from orchestrator.linear.spectra.stability import (
+    WHOLE,
+    Cause,
+    Stability,
+    judge,
+    whole_spectrum,
+    zeros_in_words,
+)
 from orchestrator.systems.coupling.master import Master
 
 MOVED = 0.01  # part of its size by which a step may move a mode before a warning
@@ -129,9 +136,12 @@ def verdict_warnings(stability: Stability) -> tuple[str, ...]:
     if stability.stable is None and stability.reason:
         return (f"whether the system is stable is not known: {stability.reason}",)
     rate, growth = stability.largest_growth_rate, stability.continuous_growth_rate
+    several = stability.of_zeros
+    zeros = (zeros_in_words(stability.zeros, several),) if several else ()
     if stability.cause is not Cause.COUPLING or growth is None:
-        return ()
+        return zeros
     return (
+        *zeros,
         f"the coupling is numerically unstable: with a communication step of {stability.step_size:g} s the step map "
         f"grows at {rate:.3g} 1/s where the continuous system has at most {growth:.3g} 1/s",
     )

@@ -3,7 +3,7 @@
 The step map is what a simulation runs, the continuous model is the system itself. Both are judged: a coupling may
 destabilise a stable system, and a long communication step may damp a mode that grows in the system."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
@@ -30,6 +30,7 @@ from orchestrator.linear.spectra.modes import (
     oscillations,
 )
 from orchestrator.linear.spectra.slowest_decay import Decay
+from orchestrator.linear.spectra.zero_space import ZeroSpace, zero_space
 
 # up to so many states, all eigenvalues are computed; in larger systems growing ones are searched
 # for
@@ -154,6 +155,8 @@ class Stability(NoTruth):
         Why the verdict is not known, or which region was not searched.
     common_speed
         The machines' speeds where what grows fastest is the drift of all of them alike; none otherwise.
+    of_zeros
+        States that take part most in several zeros, in a system too large for all its eigenvalues.
 
     Examples
     --------
@@ -177,6 +180,7 @@ class Stability(NoTruth):
     step_size: float | None = None  # communication step [s]; None for a continuous model
     reason: str = ""  # why the verdict is not known, or the region that was not searched
     common_speed: tuple[str, ...] = ()  # the machines' speeds where they drift alike
+    of_zeros: tuple[str, ...] = ()  # states that take part most in several zeros of a large system
 
     @property
     def only_common_speed(self) -> bool:
@@ -218,10 +222,11 @@ class Stability(NoTruth):
     def because(self) -> str:
         """The figures behind the verdict's word."""
         if self.mode is None or self.stable is None:
-            return self.reason or "there is no eigenvalue but zeros"
+            told = self.reason or "there is no eigenvalue but zeros"
+            return f"{told}; {zeros_in_words(self.zeros, self.of_zeros)}" if self.of_zeros else told
         tail = f"; {self.reason}" if self.reason else ""
         if self.zeros:
-            tail += f"; {zeros_in_words(self.zeros)}"
+            tail += f"; {zeros_in_words(self.zeros, self.of_zeros)}"
         if self.stable:
             where = self._where(self.mode)
             return f"the largest real part of all {self.eigenvalues} eigenvalues is {where}{tail}"
@@ -270,10 +275,17 @@ class Stability(NoTruth):
         }
 
 
-def zeros_in_words(zeros: int) -> str:
+def zeros_in_words(zeros: int, states: Sequence[str] = ()) -> str:
+    """Return what several zeros are, and the states in which they lie where these are known."""
     if zeros == 1:
         return "one eigenvalue is zero, taken for that of the free angle, and left out"
-    return f"{zeros} eigenvalues are zero, one of them may be the free angle: nothing restores the others"
+    text = f"{zeros} eigenvalues are zero, one of them may be the free angle: nothing restores the others"
+    if not states:
+        return text
+    return (
+        f"{text}, which lie in {few(states, _STATES_NAMED)}; what each of the regulators that hold one voltage "
+        "without droop feeds is undefined: give them a compensation of their currents, or a droop"
+    )
 
 
 def place(value: complex, step_size: float | None = None) -> str:
@@ -355,6 +367,8 @@ def judge(
         of_system = None  # what grows is told beside the mode of the system, which is to be found
     continuous = _look_at(system, of_system or whole_spectrum(system))
     rate = continuous.largest_growth_rate
+    if spectrum is None:  # its zeros are looked for in the continuous model alone
+        own = replace(own, zeros=continuous.zeros, of_zeros=continuous.of_zeros)
     if own.stable is False and continuous.stable is not None and _only_slow(spectrum, own):
         slow = f"slow eigenvalues, up to {SLOW:g} rad/s, are those without a communication step"
         return replace(
@@ -395,11 +409,13 @@ def _look_at(model: LinearModel, spectrum: Spectrum | None) -> Stability:
         search = find_growing_modes(model)
         mode = search.fastest
         n = len(model.names)
+        resting = ZeroSpace(0, ()) if model.step_size else zero_space(model)
         return Stability(
             mode is None,
             mode,
             growing=len(search.eigenvalues),
-            zeros=0,
+            zeros=resting.count,
+            of_zeros=resting.states,
             eigenvalues=n,
             cause=Cause.SYSTEM if mode else None,
             continuous_growth_rate=None,
