@@ -28,7 +28,7 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port_variables import SYSTEM_BASE
 from fmus.toolchain.symbols import Scalar
 
-_NEAREST = 1e-3
+NEAREST = 1e-3
 """Least part of the way between a fault and an end of its line; nearer ones are faults at the bus."""
 
 _LEAST = Phasor(1e-12, 0.0)
@@ -95,8 +95,8 @@ def declare_line_parts(m: ModelBuilder, line: Line, values: LineValues, y: Phaso
         0.5,
         "1",
         f"Part of the way from {line.from_bus} at which a fault is",
-        minimum=_NEAREST,
-        maximum=1 - _NEAREST,
+        minimum=NEAREST,
+        maximum=1 - NEAREST,
         tunable=True,
     )
     y_f, on = switched_fault_admittance(m, line.name)

@@ -5,7 +5,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from fmus.grid.line_parts import NEAREST
 from orchestrator.cases.case import Case
+from orchestrator.cases.events.line_events import SHARES
 from orchestrator.cases.form.schema import (
     BusFaultTable,
     CaseTable,
@@ -134,9 +136,9 @@ def _at_one_end(opened: str) -> dict[str, str]:
 
 
 def _is_between_ends(at: str) -> bool:
-    """Return whether a word is a share of the way along a line that lies between its ends."""
+    """Return whether a word is a share of the way along a line that lies between its ends, and not at one of them."""
     try:
-        return 0 < to_unit(at, "1") < 1
+        return NEAREST <= to_unit(at, "1") <= 1 - NEAREST
     except ValueError:
         return False
 
@@ -145,8 +147,8 @@ def _along_a_line(given: Mapping[str, str], along: re.Match[str]) -> dict[str, s
     """Return the keys of a fault along a line, from those of one at a bus."""
     if not _is_between_ends(along["at"]):
         raise ValueError(
-            f"at {along['at']!r}: along a line it is the share of the way from its from bus, such as 'at 30 %'; "
-            "a fault at an end of it is one at that bus, as in 'bus_9, 150 ms'"
+            f"at {along['at']!r}: along a line it is the share of the way from its from bus, such as 'at 30 %', "
+            f"{SHARES}; a fault at an end of it is one at that bus, as in 'bus_9, 150 ms'"
         )
     found = {key: word for key, word in given.items() if key not in ("bus", "cleared_by")}
     opened = given.get("cleared_by")

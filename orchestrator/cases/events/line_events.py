@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from fmus.grid.element_data import Line
+from fmus.grid.line_parts import NEAREST
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.events.zero_sequence_transformers import unit_side
 from orchestrator.cases.form import schema
@@ -13,6 +14,9 @@ from orchestrator.core.errors import Problem, QuestionTopic
 from orchestrator.core.options import Option
 from orchestrator.systems.coupling import events as coupled
 from orchestrator.systems.coupling.events import Event
+
+SHARES = f"from {100 * NEAREST:g} to {100 * (1 - NEAREST):g} %"
+"""Parts of the way along a line at which a fault can be, in words."""
 
 _REMEDY = 'write models = "phasor" at the top of the case, or ' + Option.SET + " models=phasor"
 
@@ -111,7 +115,7 @@ def _side(draft: Draft, line: Line, bus: str, where: str) -> Literal["from", "to
 
 
 def _line_fault(draft: Draft, table: schema.LineFaultTable, grid: str, where: str) -> list[Event]:
-    if _is_within_a_transformer(draft, table, where):
+    if _is_within_a_transformer(draft, table, where) or _is_at_an_end(draft, table, where):
         return []
     begin = coupled.LineFault(
         table.time, grid, table.line, table.at, True, R=table.R, X=table.X, kind=table.kind
@@ -130,6 +134,20 @@ def _line_fault(draft: Draft, table: schema.LineFaultTable, grid: str, where: st
     elif table.opens == "pole" and closed is not None:
         events += _pole(draft, table, (grid, where), (end, closed))
     return events
+
+
+def _is_at_an_end(draft: Draft, table: schema.LineFaultTable, where: str) -> bool:
+    """Note a fault so near to an end of its line that it is one at the bus there."""
+    line = _line(draft, table.line)
+    if line is None or NEAREST <= table.at <= 1 - NEAREST:
+        return False
+    bus = line.from_bus if table.at < NEAREST else line.to_bus
+    draft.note(
+        where,
+        f"at = {100 * table.at:g} %: along {table.line} it is {SHARES} of the way from {line.from_bus}; a fault at "
+        f"this end is one at {bus}: type = 'bus_fault', bus = {bus!r}",
+    )
+    return True
 
 
 def _end_by_end(

@@ -458,6 +458,12 @@ def test_what_cannot_be_is_refused_by_name(tmp_path):
         ),
         ("at = 0.3\nduration = '0.1 s'\nopens = 'pole'", "opens = 'pole' is for a fault of kind"),
         ("at = 1.3", "at"),
+        (
+            "at = '0.01 %'",
+            "at = 0.01 %: along l23 it is from 0.1 to 99.9 % of the way from b2; a fault at this end is one at "
+            "b2: type = 'bus_fault', bus = 'b2'",
+        ),
+        ("at = 0.9995", "at = 99.95 %: .* type = 'bus_fault', bus = 'b3'"),
         ("at = 0.3\nkind = '4-phase'", "kind"),
     ],
 )
@@ -652,6 +658,11 @@ def test_faults_in_words(text, keys):
         ("line_7_9 at 130 %, 100 ms", "at '130 %': along a line it is the share of the way"),
         ("line_7_9 at 30, 100 ms", "at '30': along a line it is the share of the way"),
         ("line_7_9 at 0 %, 100 ms", "a fault at an end of it is one at that bus"),
+        (
+            "line_7_9 at 0.01 %, 100 ms",
+            "at '0.01 %': .* 'at 30 %', from 0.1 to 99.9 %; a fault at an end of it is one at that bus, as in 'bus_9",
+        ),
+        ("line_7_9 at 99.95 %, 100 ms", "at '99.95 %': .* as in 'bus_9, 150 ms'"),
         ("line_7_9 at bus_7, 100 ms", "at 'bus_7': along a line it is the share of the way"),
         ("line_7_9 at 30 %, 100 ms, opens line_8", "'opens it' or 'opens one pole'"),
         ("line_7_9 at 30 %, 100 ms, opens one pole", "opens = 'pole' is for a fault of kind"),
