@@ -2,13 +2,15 @@
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from typing import NamedTuple
 
 from fmus.toolchain.port_variables import LARGEST_POWER
 from orchestrator.cases.flow.power_flow import FlowUnit, PowerFlow
 from orchestrator.core.errors import ErrorKind, InputError
 from orchestrator.core.options import Option
+from orchestrator.core.spelling import Text
 from orchestrator.systems.coupling.system import ComponentPlan
 
 _CLOSE = 1e-6  # power [MW] that may be left to the units at the slack bus beside their share
@@ -40,30 +42,48 @@ class Dispatch:
     change: float
 
 
+_OF_FILE = "the network file's most, PT in a RAW file"
+
+
+class PowerLimit(NamedTuple):
+    """A most active power, and in words whose it is."""
+
+    most: float
+    whose: str
+
+
 @dataclass(frozen=True)
 class Room:
     """Limits of the units' powers that a file gives beside their models.
 
     ``active``: least and most active power [MW]; ``ratings``: likely ratings [MVA] of units whose S_n is only the base
-    of their data."""
+    of their data; ``loads``: what loads draw [MW]."""
 
     active: Mapping[str, tuple[float, float]]
     ratings: Mapping[str, float]
+    loads: Mapping[str, float] = field(default_factory=dict)
 
-    def limits_of(self, name: str) -> tuple[float, float]:
-        low, high = self.active.get(name, (-math.inf, math.inf))
-        return low, min(high, self.ratings.get(name, math.inf))
+    def least_of(self, name: str) -> float:
+        return self.active.get(name, (-math.inf, math.inf))[0]
+
+    def highest_of(self, name: str) -> list[PowerLimit]:
+        high = self.active.get(name, (-math.inf, math.inf))[1]
+        rating = self.ratings.get(name, math.inf)
+        return [PowerLimit(high, _OF_FILE), PowerLimit(rating, "its likely rating")]
 
 
 @dataclass(frozen=True)
 class Reserve:
-    """A unit's share and its room: ``before``, ``least`` and ``most`` in MW, ``gain`` in MW by any common unit."""
+    """A unit's share and its room: ``before``, ``least`` and ``most`` in MW, ``gain`` in MW by any common unit.
+
+    ``whose``: the limit that ``most`` is, with the next one above, in words."""
 
     name: str
     before: float
     gain: float
     least: float
     most: float
+    whose: str = ""
 
 
 def in_words(
@@ -130,13 +150,20 @@ def power_limits(plan: ComponentPlan, reactive: float = 0.0) -> tuple[float, flo
     """Least and most active power from which a unit starts [pu, S_n]; infinite where its model has no limit.
 
     ``reactive``: Reactive power that it feeds [pu, S_n]: the current that is left is active."""
-    low, high = [-math.inf], [math.inf]
+    least, highest = _limits_of_model(plan, reactive)
+    return least, highest.most
+
+
+def _limits_of_model(plan: ComponentPlan, reactive: float) -> tuple[float, PowerLimit]:
+    """Return the least power from which a unit starts, and its lowest upper limit [pu, S_n]; see `power_limits`."""
+    low, high = [-math.inf], [PowerLimit(math.inf, "")]
 
     def turbine(least: str, most: str, factor: float = 1.0, idle: float = 0.0) -> None:
-        for name, found in ((least, low), (most, high)):
-            value = _number(plan, f"governor.{name}")
-            if value is not None:
-                found.append(factor * (value - idle))
+        lower, upper = (_number(plan, f"governor.{name}") for name in (least, most))
+        if lower is not None:
+            low.append(factor * (lower - idle))
+        if upper is not None:
+            high.append(PowerLimit(factor * (upper - idle), f"governor.{most}"))
 
     turbine("V_MIN", "V_MAX")
     turbine("P_MIN", "P_MAX", _fractions(plan))
@@ -152,24 +179,29 @@ def power_limits(plan: ComponentPlan, reactive: float = 0.0) -> tuple[float, flo
     box = _number(plan, "voltage_control.i_q_max")
     circle = _number(plan, "current_limit.I_max")
     if box is not None and (kind is None or kind < 0.5):
-        high.append(v_0 * box)
+        high.append(PowerLimit(v_0 * box, "voltage_control.i_q_max"))
     elif circle is not None:
-        high.append(math.sqrt(max(0.0, (v_0 * circle) ** 2 - reactive**2)))
+        left = math.sqrt(max(0.0, (v_0 * circle) ** 2 - reactive**2))
+        high.append(PowerLimit(left, "current_limit.I_max"))
     if len(high) > 1 and low == [-math.inf]:
-        low.append(-min(high))
+        low.append(-min(high).most)
     most = plan.description.variables["P_0"].maximum
     if most is not None:
         # beyond it S_n is only the base of the unit's data
         usual = abs(plan.number("P_0")) <= LARGEST_POWER
-        high.append(min(most, LARGEST_POWER) if usual else most)
+        high.append(PowerLimit(min(most, LARGEST_POWER) if usual else most, "its model"))
     losses = 1.5 * (_number(plan, "machine.R_s") or 0.0)
-    return max(low) + _ROOM, min(high) - _ROOM - losses
+    lowest = min(high)
+    return max(low) + _ROOM, lowest._replace(most=lowest.most - _ROOM - losses)
 
 
-def shares(reserves: Sequence[Reserve], change: float, *, bare: bool = False) -> dict[str, float]:
+def shares(
+    reserves: Sequence[Reserve], change: float, *, bare: bool = False, typed: str = ""
+) -> dict[str, float]:
     """Power of each unit [MW] after a change of the units' whole power; a unit at its limit leaves the rest to others.
 
-    ``change``: What they have to feed beside what they fed [MW]; ``bare``: without what the losses grow by."""
+    ``change``: What they have to feed beside what they fed [MW]; ``bare``: without what the losses grow by;
+    ``typed``: how the loss of a load with the units is asked for."""
     found = {one.name: one.before for one in reserves}
     free = [one for one in reserves if one.gain > 0]
     rest = change
@@ -188,7 +220,8 @@ def shares(reserves: Sequence[Reserve], change: float, *, bare: bool = False) ->
     if abs(rest) <= _CLOSE:
         return found
     raise InputError(
-        _overload(reserves, change, f"{abs(rest):.4g} MW{', before the losses grow,' * bare}"),
+        _overload(reserves, change, f"{abs(rest):.4g} MW{', before the losses grow,' * bare}")
+        + (typed if change > 0 else ""),
         kind=ErrorKind.START,
     )
 
@@ -203,6 +236,7 @@ def _overload(reserves: Sequence[Reserve], change: float, left: str) -> str:
     if change > 0 and worst.most > 0:
         first = (
             f"{worst.name} would need {100 * need / worst.most:.0f} % of its {worst.most:.4g} MW"
+            f"{worst.whose and f' ({worst.whose})'}"
         )
     elif change > 0:
         first = f"{worst.name} would need {need:.4g} MW, where its most is {worst.most:.4g} MW"
@@ -218,7 +252,7 @@ def _overload(reserves: Sequence[Reserve], change: float, left: str) -> str:
             "no unit may feed anything: if PT in the RAW file or P_MAX of the governors is not meant so, correct it, "
             "or let the slack alone feed what is lost (" + Option.SHARING + " slack)"
         )
-    return text + "give another dispatch, or lose load with the unit (unit+load)"
+    return text + "give another dispatch, or lose load with the unit"
 
 
 def shared_flow(
@@ -241,8 +275,9 @@ def shared_flow(
     }
     rating = {one.name: one.S_n for one in left}
     change, before = dispatch.change, (0.0, 0.0)
+    typed = _typed_loss(units, dispatch, room)
     for k in range(_ROUNDS):
-        found = shares(reserves, change, bare=not k)
+        found = shares(reserves, change, bare=not k, typed=typed)
         moved = {
             one.name: replace(one, P_0=found[one.name] / one.S_n)
             for one in left
@@ -265,6 +300,15 @@ def shared_flow(
     )
 
 
+def _typed_loss(units: Sequence[FlowUnit], dispatch: Dispatch, room: Room) -> Text:
+    """Return how a screening is asked to lose with the units a load of about their power; "" without a load."""
+    lost = [one.name for one in units if not one.connected and one.name in dispatch.powers]
+    if not lost or not room.loads:
+        return Text("")
+    like = min(room.loads, key=lambda name: abs(room.loads[name] - dispatch.change))
+    return "; a screening loses a load with it by " + Option.OUTAGES + f" {'+'.join([*lost, like])}"
+
+
 def _reserves(
     units: Sequence[FlowUnit],
     plans: Mapping[str, ComponentPlan],
@@ -279,20 +323,27 @@ def _reserves(
         gains = {one.name: parts[one.name] if one.Q_0 is None else 0.0 for one in left}
     found = []
     for one in left:
-        least, most = (
-            x * one.S_n for x in power_limits(plans[one.name], dispatch.powers[one.name].imag)
-        )
-        low, high = room.limits_of(one.name)
+        least, own = _limits_of_model(plans[one.name], dispatch.powers[one.name].imag)
+        highest = [PowerLimit(own.most * one.S_n, own.whose), *room.highest_of(one.name)]
         found.append(
             Reserve(
                 one.name,
                 one.P_0 * one.S_n,
                 gains[one.name] * one.S_n,
-                max(least, low),
-                min(most, high),
+                least=max(least * one.S_n, room.least_of(one.name)),
+                most=min(highest).most,
+                whose=_in_words(highest),
             )
         )
     return found
+
+
+def _in_words(highest: Sequence[PowerLimit]) -> str:
+    """Tell whose limit the lowest one is, and how much the next one would allow."""
+    first, second, *_ = sorted(highest)
+    if math.isinf(second.most):
+        return first.whose
+    return f"{first.whose}, where {second.whose} allows {second.most:.4g} MW"
 
 
 def _as_shared(

@@ -89,7 +89,8 @@ def start_from_power_flow(
             return solve(feeding)
         plans = system.components
         above = {n: mva for n, mva in (ratings or {}).items() if mva > plans[n].number("S_n")}
-        return shared_flow(solve, feeding, plans, slack, dispatch, Room(active or {}, above))
+        room = Room(active or {}, above, {name: load.p_mw for name, load in loads.items()})
+        return shared_flow(solve, feeding, plans, slack, dispatch, room)
 
     flow = solve_with_controls(
         find, system.components[grid], _acting(controls, feeding, system, grid)

@@ -5,7 +5,8 @@ from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
 Told = TypeVar("Told")
-_FIGURE = re.compile(r"[-+]?\b\d[\d.,]*(?:e[-+]?\d+)?")
+_FIGURE = re.compile(r"\boutages[ =]\S+\+\S+|[-+]?\b\d[\d.,]*(?:e[-+]?\d+)?")
+"""A figure, or an outage of several elements as it is typed."""
 LONGEST_REMARK = 120
 """Characters of a remark in a table; JSON and Python have the whole text."""
 

@@ -72,6 +72,10 @@ MODES = "modes.csv"
 SUMMARY = "screening.json"
 PAGE = "screening.html"
 
+_CLAUSE = re.compile(
+    r"[:;] (?!no )"
+)  # ends the first clause of a cause; after "power flow:" it goes on
+_SCENARIO = re.compile(r"^.*?scenario '[^']*': ")  # the place of a cause, which all items have
 _SHOWN = 4  # kinds of warnings that are listed; the others are counted
 _FEW = 6  # points that are named one by one
 _NAMED = 40  # outages of one cause that are named: a planner looks for each; items.csv has them all
@@ -308,6 +312,7 @@ def overview(summary: Summary, most: int = 12) -> ColumnTable[OutageRow]:
         columns.append(Column("What grows besides", _grows_besides, text=True))
     if any(row.unjudged for row in rows):
         columns.append(Column("Not judged", _unjudged))
+        columns.append(Column("Why not", _why_unjudged, text=True))
     return ColumnTable(title, columns, rows, _place_of(columns, "Damping [%]"), most, ITEMS)
 
 
@@ -327,6 +332,15 @@ def _grows_besides(row: OutageRow) -> str:
 
 def _unjudged(row: OutageRow) -> str:
     return f"{len(row.unjudged)} of {row.points}" if row.unjudged else ""
+
+
+def _why_unjudged(row: OutageRow) -> str:
+    """Return what became of the first item of an outage that has no modes, with the first clause of its cause."""
+    if not row.unjudged:
+        return ""
+    record = row.unjudged[0].record
+    cause = _SCENARIO.sub("", record.text)
+    return f"{record.status}: {_CLAUSE.split(cause, maxsplit=1)[0]}"
 
 
 def _who(mode: ModeAt | None) -> str:

@@ -27,7 +27,10 @@ def test_an_outage_without_any_verdict_is_told_by_its_first_point():
         outages=(),
         prepared=SimpleNamespace(regions=SimpleNamespace(has_areas=False)),
     )
-    lost = item(status=Status.POWER_FLOW)
+    why = (
+        "line 9, power_flow: scenario 'base': power flow: no way leads to b1 from: 'b3'; close l23"
+    )
+    lost = item(status=Status.POWER_FLOW, text=why)
     table = view.overview(SimpleNamespace(result=SimpleNamespace(plan=plan, items=(lost,))))
     assert [column.cell(table.rows[0]) for column in table.columns] == [
         "sg2",
@@ -35,6 +38,7 @@ def test_an_outage_without_any_verdict_is_told_by_its_first_point():
         "",
         "–",
         "1 of 1",
+        "no power flow: power flow: no way leads to b1 from",
     ]
 
 

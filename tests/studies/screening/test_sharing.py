@@ -23,7 +23,7 @@ from orchestrator.studies.points.store import PointStore
 from orchestrator.studies.screening.request import ScreeningRequest
 from orchestrator.studies.screening.study import plan_screening, run_screening
 from orchestrator.studies.screening.summary import Summary
-from orchestrator.studies.screening.view import as_json, remarks
+from orchestrator.studies.screening.view import as_json, overview, remarks
 from orchestrator.studies.screening.words import verdict_sentence
 from tests.cases.new.test_widened_limits import new_case
 from tests.studies.screening.five_machines import DROOPS, POWERS, RATINGS, five_machines
@@ -303,7 +303,27 @@ def test_the_files_most_power_is_a_limit_of_sharing(tmp_path):
         five_machines(tmp_path, most=dict.fromkeys(RATINGS, 195.0)), tmp_path, "sg3"
     )
     assert item.record.status is Status.STEADY_STATE
-    assert re.search(r"sg\d would need \d+ % of its 195 MW", item.record.text)
+    limit = r"sg\d would need \d+ % of its 195 MW \(the network file's most, PT in a RAW file, where governor.V_MAX "
+    assert re.search(limit + r"allows \d{3}\.?\d* MW\)", item.record.text)
+
+
+def test_the_table_says_why_and_the_outage_that_is_named_can_be_typed(tmp_path):
+    """All machines end at 165 MW, or at what they feed: of sg3's 160 MW too few can be shared."""
+    case = five_machines(tmp_path, most=dict.fromkeys(RATINGS, 165.0))
+    work = Work(Serial(), PointStore(tmp_path / "points"))
+    found = Summary(
+        run_screening(plan_screening(case, ScreeningRequest(None, "sg3", "base")), work)
+    )
+    table = overview(found)
+    (why,) = (column for column in table.shown_columns if column.heading == "Why not")
+    (said,) = (why.cell(row) for row in table.rows if row.name == "sg3")
+    assert "no steady state: sg" in said
+    assert "PT in a RAW file" in said
+    (lost,) = found.failures()
+    (typed,) = re.findall(r"--outages ([\w+]+)", lost.record.text)
+    assert typed.startswith("sg3+load_")
+    (_, item) = screened(case, tmp_path, typed)
+    assert item.record.status is Status.COMPUTED
 
 
 def test_all_that_cannot_be_shared_is_named(tmp_path):
@@ -362,7 +382,8 @@ def test_what_cannot_be_shared_says_who_would_need_how_much(five, tmp_path):
     (_, lost, fine) = screened(five, tmp_path, "sg1+sg2,sg2")
     assert (lost.record.status, fine.record.status) == (Status.STEADY_STATE, Status.COMPUTED)
     assert re.search(
-        r"sg3 would need 122 % of its 263.8 MW: 320 MW more cannot be shared", lost.record.text
+        r"sg3 would need 122 % of its 263.8 MW \(governor.V_MAX\): 320 MW more cannot be shared",
+        lost.record.text,
     )
     assert "slack" not in lost.record.text, "it alone cannot do what all together cannot"
 
