@@ -34,10 +34,29 @@ def c_function(function: Function, name: str) -> str:
 def lanes_function(function: Function, name: str) -> str:
     """The same of ``lanes``, which ``c/lanes.h`` declares."""
     head = f"IN_PLACE void {name}(const lanes **arg, lanes **res)"
-    return _text(function, head, "lanes", LANES)
+    return _text(function, head, "lanes", LANES, _angles(function))
 
 
-def _text(function: Function, head: str, kind: str, forms: Mapping[int, str]) -> str:
+def _angles(function: Function) -> dict[int, int]:
+    """Sines and cosines of one angle, as numbers of instructions; each with the first of its angle."""
+    source: dict[int, tuple[int, ...]] = {}
+    taken: dict[tuple[int, ...], dict[int, int]] = {}
+    for k, (op, place, a, b, _) in enumerate(function.instructions):
+        if op in (Op.SIN, Op.COS):
+            taken.setdefault(source[a], {})[k] = op
+        if op != Op.OUTPUT:
+            source[place] = (a, b) if op == Op.INPUT else (k,)
+    both = [by for by in taken.values() if len(set(by.values())) > 1]
+    return {k: min(by) for by in both for k in by}
+
+
+def _text(
+    function: Function,
+    head: str,
+    kind: str,
+    forms: Mapping[int, str],
+    angles: Mapping[int, int] = {},
+) -> str:
     lines = [f"{head} {{\n  (void)arg, (void)res;\n"]
     number = "{}" if kind == "double" else "NUMBER({})"
     held: dict[int, str] = {}  # what holds the value of each place
@@ -49,6 +68,11 @@ def _text(function: Function, head: str, kind: str, forms: Mapping[int, str]) ->
             text = f"arg[{a}][{b}]"
         elif op == Op.CONST:
             text = number.format(repr(value).replace("inf", "INFINITY").replace("nan", "NAN"))
+        elif k in angles:
+            first = angles[k]
+            if k == first:
+                lines.append(f"  lanes sin{k}, cos{k}; OF_ANGLE({held[a]}, sin{k}, cos{k})\n")
+            text = f"sin{first}" if op == Op.SIN else f"cos{first}"
         else:
             text = forms[op].format(held[a], held[b])
         held[place] = f"v{k}"

@@ -144,6 +144,19 @@ def test_members_have_the_bits_that_each_has_alone(name, count):
     assert len(set(alone[-1][1])) == count  # each went its own way
 
 
+def test_members_may_step_beside_others_than_before():
+    """Parameters are kept side by side; whoever has new neighbours is not taken for another."""
+
+    def course(row, index, random):
+        wander(row, index, random)
+        if index % 3 == 2:
+            row.members.append(row.members.pop(0))
+
+    alone, together = both("operations", SIDE_BY_SIDE + 3, course)
+    assert alone == together
+    assert all(status == [OK] * (SIDE_BY_SIDE + 3) for status, _ in together)
+
+
 def test_one_of_another_internal_step_keeps_it():
     alone, together = both("operations", 4, wander, internal_step=5e-5)
     assert alone == together

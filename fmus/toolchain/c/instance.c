@@ -28,6 +28,8 @@ struct instance {
     void *environment, *logger;
     int quiet; /* messages below an error are not wanted */
     double *work, *before;
+    struct beside *beside; /* what keeps its parameters beside others', as `stack.c` has it; NULL where they changed since */
+    void *own_beside;      /* memory of the one that it leads */
 #ifdef TAPE
     struct model model;
 #endif
@@ -73,6 +75,12 @@ static int set_logging(struct instance *s, int on, size_t n, const char *const c
     return OK;
 }
 
+/* What was kept for the next step is of other parameters. */
+static void begin_anew(struct instance *s) {
+    s->step_size = 0;
+    s->beside = NULL;
+}
+
 static void set_to_start(struct instance *s) {
     memset(s->z, 0, NV * sizeof *s->z);
     for (int i = 0; i < NP; ++i) s->z[i] = START[i];
@@ -80,7 +88,8 @@ static void set_to_start(struct instance *s) {
     s->phase = INSTANTIATED;
     s->changed = s->stale = 1;
     s->failed = 0;
-    s->time = s->step_size = 0;
+    s->time = 0;
+    begin_anew(s);
 }
 
 /* An instance that can log; `prepare` makes it one of the model. */
@@ -104,6 +113,7 @@ static void destroy(struct instance *s) {
     free(s->work);
     free(s->z);
     free(s->before);
+    free(s->own_beside);
     free(s);
 }
 
@@ -191,7 +201,7 @@ static int set_parameter(struct instance *s, unsigned reference, double value, i
     if (value > p->maximum) return say(s, DISCARD, "parameter %s = %g; it must be at most %g", name, value, p->maximum);
     s->z[reference] = value;
     s->changed = s->stale = 1;
-    s->step_size = 0; /* internal_step may be what changed */
+    begin_anew(s); /* internal_step may be what changed */
     return OK;
 }
 
@@ -325,7 +335,7 @@ static int restore(struct instance *s, const struct snapshot *copy) {
     memcpy(s->z, copy->z, NV * sizeof *s->z);
     s->stale = 1;
     s->failed = 0;
-    s->step_size = 0;
+    begin_anew(s);
     return OK;
 }
 

@@ -2,23 +2,53 @@
    ordinary, one of them alone or a processor without wide registers: they step one by one. */
 #ifdef STACKED
 
-/* One step of as many instances, with functions that were compiled for the same registers. Nothing is written where a
-   state is no longer finite; returns whether all are. */
-IN_PLACE int step_lanes(struct instance *const *s, void (*rates_of)(const lanes **, lanes **),
-                        void (*outputs_of)(const lanes **, lanes **)) {
-    lanes p[U + 1], u[NU + 1], h[NH + 1], x[NX + 1], y[NY + 1], t[NX + 1], k1[NX + 1], k2[NX + 1], k3[NX + 1], k4[NX + 1];
-    lanes moved[NS + 1];
+/* Parameters of instances and what these fix, side by side as a step takes them: they stay from step to step, and an
+   instance's own need not come from memory. */
+struct beside {
+    const struct instance *of[LANES];
+    lanes p[U + 1], h[NH + 1];
+};
+
+static int is_of(const struct beside *b, struct instance *const *s) {
+    for (int lane = 0; lane < LANES; ++lane)
+        if (s[lane]->beside != b || b->of[lane] != s[lane]) return 0;
+    return 1;
+}
+
+/* What the first instance keeps for all, made where they are not as they were; NULL without memory. */
+static struct beside *parameters_of(struct instance *const *s) {
+    struct instance *first = s[0];
+    if (first->beside && is_of(first->beside, s)) return first->beside;
+    if (!first->own_beside) first->own_beside = calloc(1, sizeof(struct beside) + _Alignof(struct beside));
+    if (!first->own_beside) return NULL;
+    const uintptr_t most = (uintptr_t)first->own_beside + _Alignof(struct beside);
+    struct beside *b = (struct beside *)(most - most % _Alignof(struct beside));
     for (int lane = 0; lane < LANES; ++lane) {
         const double *z = s[lane]->z, *fixed = s[lane]->work + AT_FIXED;
-        for (int i = 0; i < U; ++i) p[i][lane] = z[i];
+        double *p = (double *)b->p + lane, *h = (double *)b->h + lane;
+        for (int i = 0; i < U; ++i) p[LANES * i] = z[i];
+        for (int i = 0; i < NH; ++i) h[LANES * i] = fixed[i];
+        b->of[lane] = s[lane];
+        s[lane]->beside = b;
+    }
+    return b;
+}
+
+/* One step of as many instances, with functions that were compiled for the same registers. Nothing is written where a
+   state is no longer finite; returns whether all are. */
+IN_PLACE int step_lanes(struct instance *const *s, const struct beside *b, void (*rates_of)(const lanes **, lanes **),
+                        void (*outputs_of)(const lanes **, lanes **)) {
+    lanes u[NU + 1], x[NX + 1], y[NY + 1], t[NX + 1], k1[NX + 1], k2[NX + 1], k3[NX + 1], k4[NX + 1];
+    lanes moved[NS + 1], rest = {0};
+    for (int lane = 0; lane < LANES; ++lane) {
+        const double *z = s[lane]->z;
         for (int i = 0; i < NU; ++i) u[i][lane] = z[U + i];
         for (int i = 0; i < NX; ++i) x[i][lane] = z[X + i];
-        for (int i = 0; i < NH; ++i) h[i][lane] = fixed[i];
     }
     const double part = s[0]->part;
     const int parts = s[0]->parts;
     lanes *of_x[] = {k1}, *of_t2[] = {k2}, *of_t3[] = {k3}, *of_t4[] = {k4}, *of_outputs[] = {y};
-    const lanes *at_x[] = {x, u, p, p + C, h}, *at_t[] = {t, u, p, p + C, h};
+    const lanes *at_x[] = {x, u, b->p, b->p + C, b->h}, *at_t[] = {t, u, b->p, b->p + C, b->h};
     if (NS) {
         rates_of(at_x, of_x);
         for (int i = 0; i < NS; ++i) moved[i] = parts * part * k1[STEPWISE[i]];
@@ -38,9 +68,9 @@ IN_PLACE int step_lanes(struct instance *const *s, void (*rates_of)(const lanes 
         for (int i = 0; i < NX; ++i) x[i] += part / 6 * (k1[i] + 2 * k2[i] + 2 * k3[i] + k4[i]);
     }
     for (int i = 0; i < NS; ++i) x[STEPWISE[i]] += moved[i];
-    for (int i = 0; i < NX; ++i)
-        for (int lane = 0; lane < LANES; ++lane)
-            if (!isfinite(x[i][lane])) return 0;
+    for (int i = 0; i < NX; ++i) rest += x[i] - x[i]; /* 0, but NaN where a state is not finite */
+    for (int lane = 0; lane < LANES; ++lane)
+        if (rest[lane] != 0) return 0;
     outputs_of(at_x, of_outputs);
     for (int lane = 0; lane < LANES; ++lane) {
         double *z = s[lane]->z;
@@ -57,13 +87,13 @@ IN_PLACE int step_lanes(struct instance *const *s, void (*rates_of)(const lanes 
     __attribute__((target(#name))) static void outputs_##name(const lanes **arg, lanes **res) {                        \
         outputs_lanes(arg, res);                                                                                       \
     }                                                                                                                  \
-    __attribute__((target(#name))) static int step_##name(struct instance *const *s) {                                 \
-        return step_lanes(s, rates_##name, outputs_##name);                                                            \
+    __attribute__((target(#name))) static int step_##name(struct instance *const *s, const struct beside *b) {         \
+        return step_lanes(s, b, rates_##name, outputs_##name);                                                         \
     }
 FOR_REGISTERS(avx512f)
 FOR_REGISTERS(avx2)
 
-typedef int (*side_by_side)(struct instance *const *);
+typedef int (*side_by_side)(struct instance *const *, const struct beside *);
 
 /* By what processor and system offer; NULL without wide registers. */
 static side_by_side widest(void) {
@@ -89,7 +119,8 @@ static int step_block(struct instance *const *s, size_t n, double time, double s
     for (size_t k = 0; k < n; ++k)
         if (!is_ready(s[k], s[0], step_size)) return 0;
     for (size_t k = 0; k < LANES; ++k) block[k] = s[k < n ? k : n - 1]; /* the last one fills what is left */
-    if (!step(block)) return 0;
+    const struct beside *parameters = parameters_of(block);
+    if (!parameters || !step(block, parameters)) return 0;
     for (size_t k = 0; k < n; ++k) s[k]->stale = 0, s[k]->time = time + step_size;
     return 1;
 }

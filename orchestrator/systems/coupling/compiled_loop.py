@@ -214,6 +214,7 @@ class CompiledLoop:
         self._threads = threads
         self._leader = np.arange(n)  # of each call: who is done for it too
         self._stacks: list[tuple[_Stack, NDArray[Any], NDArray[Any], NDArray[Any]]] = []
+        self._waiting: list[NDArray[np.float64]] = []  # outputs of stacks
         self._led: list[list[int]] = [self._stack_up(group) for group in self._members]
         self._bound = np.array([e.component.one_thread is not None for e in self._exchanges])
         self._team: Team | None = None
@@ -265,9 +266,19 @@ class CompiledLoop:
             n=len(members),
         )
         self._stacks.append((stack, components, places, status))
+        self._waiting.append(self._fresh(members))
         self._leader[members] = members[0]
         for call in members:
             self._calls[call].stack = ctypes.addressof(stack)
+
+    def _fresh(self, members: Sequence[int]) -> NDArray[np.float64]:
+        """Let the outputs of calls wait in memory of their own, which is returned."""
+        fresh = apart(sum(self._calls[call].n_outputs for call in members))
+        place = fresh.ctypes.data
+        for call in members:
+            self._calls[call].fresh = place
+            place += fresh.itemsize * self._calls[call].n_outputs
+        return fresh
 
     def advance(self, index: int, count: int, step_size: float) -> None:
         status = 0
@@ -358,13 +369,7 @@ class CompiledLoop:
         entry.n_own = len(own)
         self._kept += [own, shared, begin]
         for part in (found.own, *found.of):
-            done = np.flatnonzero(np.isin(self._leader, part)).tolist()
-            fresh = apart(sum(self._calls[call].n_outputs for call in done))
-            self._kept.append(fresh)
-            place = fresh.ctypes.data
-            for call in done:
-                self._calls[call].fresh = place
-                place += 8 * self._calls[call].n_outputs
+            self._kept.append(self._fresh([call for call in part if not self._calls[call].stack]))
 
     def seconds(self) -> list[float]:
         seconds: list[float] = self._spent.tolist()

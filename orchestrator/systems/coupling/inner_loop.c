@@ -30,7 +30,7 @@ struct call {
     double *inputs, *outputs;
     const int64_t *sources; /* index in y of what feeds each input */
     int64_t n_inputs, n_outputs;
-    double *fresh; /* where a thread leaves outputs until all have stepped */
+    double *fresh; /* where outputs wait until all have stepped, read by a thread or beside others of a stack */
     double spent; /* seconds for inputs and the FMU's functions, summed up */
     struct track *tracks; /* one for each output */
     int32_t status, stage; /* of a call that was refused */
@@ -132,19 +132,16 @@ static void whole_call(void *of, int64_t which) {
     for (int64_t k = 0; k < stack->n; ++k) member(now, stack, k)->spent += each;
 }
 
-/* Step a call, or the stack that it leads; one that follows was stepped then. */
-static void timed_step(const struct now *now, struct call *c) {
-    const struct stack *stack = c->stack;
-    if (stack && !leads(now, c)) return;
-    const double start = seconds();
-    if (!stack) {
-        step_one(c, now->y, now->time, now->step_size);
-        c->spent += seconds() - start;
+/* Step a call; or do the stack that it leads, whose outputs are read while its instances are in the processor's cache:
+   after the others they would come from memory. One that follows was done then. */
+static void timed_step(struct now *now, struct call *c) {
+    if (c->stack) {
+        if (leads(now, c)) whole_call(now, c - now->calls);
         return;
     }
-    step_stack(now, stack);
-    const double each = (seconds() - start) / (double)stack->n;
-    for (int64_t k = 0; k < stack->n; ++k) member(now, stack, k)->spent += each;
+    const double start = seconds();
+    step_one(c, now->y, now->time, now->step_size);
+    c->spent += seconds() - start;
 }
 
 static int timed_reading(struct call *c) {
@@ -155,7 +152,7 @@ static int timed_reading(struct call *c) {
 }
 
 /* Step a group; the status of what was refused, NOT_FINITE, or 0, and failure = {, call, SET | STEP | GET or output}. */
-static int step_group(const struct now *now, const struct group *g, struct team *team, int64_t *failure) {
+static int step_group(struct now *now, const struct group *g, struct team *team, int64_t *failure) {
     const int together = team && g->begin;
     if (together) team_do(team, g->own, g->n_own, g->shared, g->begin);
     for (int64_t i = g->first; i < g->last; ++i) {
@@ -168,11 +165,12 @@ static int step_group(const struct now *now, const struct group *g, struct team 
     }
     for (int64_t i = g->first; i < g->last; ++i) {
         struct call *c = &now->calls[i];
-        if (together ? c->stage == GET : timed_reading(c)) {
+        const int was_read = together || c->stack;
+        if (was_read ? c->stage == GET : timed_reading(c)) {
             failure[1] = i, failure[2] = GET;
             return c->status;
         }
-        if (together) memcpy(c->outputs, c->fresh, (size_t)c->n_outputs * sizeof *c->outputs);
+        if (was_read) memcpy(c->outputs, c->fresh, (size_t)c->n_outputs * sizeof *c->outputs);
         if ((failure[2] = follow(c->tracks, c->outputs, c->n_outputs)) >= 0) {
             failure[1] = i;
             return NOT_FINITE;
