@@ -9,7 +9,8 @@
 #define SOUGHT (ELEMENTS + 2 * NM)
 #define CURRENT (SOUGHT + 2 * NB)
 #define SWEPT (CURRENT + 2 * NB)
-#define REACH (SWEPT + 2 * NB)
+#define BEGUN (SWEPT + 2 * NB)
+#define REACH (BEGUN + 2 * NB)
 #define NODAL_SIZE (REACH + REACH_WORDS(*OF(w)) / 2 + 1 - OWN)
 
 /* What Y follows from is as it was when it was factorised. A large network's parameters take as long to compare as its
@@ -24,20 +25,27 @@ static int unchanged(double *w) {
     return 1;
 }
 
-/* What is left of the current into a row after the rows above it. */
-static inline void sweep_row(const double *lu, const double *b, double *y, const struct tape *t, int i) {
-    const int32_t *col = t->col;
-    double re = b[t->perm[i]], im = b[t->size.buses + t->perm[i]];
-    for (int q = t->row[i]; q < t->diag[i]; ++q) {
+#define IN_ROW static inline __attribute__((always_inline))
+
+/* Take elements from `first` to before `last` of a row, times y, off what is left of a current, which goes to `rest`. */
+IN_ROW void take_off(double *rest, double re, double im, const double *lu, const double *y, const int32_t *col, int first,
+                     int last) {
+    for (int q = first; q < last; ++q) {
         re -= lu[2 * q] * y[2 * col[q]] - lu[2 * q + 1] * y[2 * col[q] + 1];
         im -= lu[2 * q] * y[2 * col[q] + 1] + lu[2 * q + 1] * y[2 * col[q]];
     }
-    y[2 * i] = re;
-    y[2 * i + 1] = im;
+    rest[0] = re;
+    rest[1] = im;
+}
+
+/* What is left of the current into a row after the rows above it. */
+IN_ROW void sweep_row(const double *lu, const double *b, double *y, const struct tape *t, int i) {
+    const int bus = t->perm[i];
+    take_off(y + 2 * i, b[bus], b[t->size.buses + bus], lu, y, t->col, t->row[i], t->diag[i]);
 }
 
 /* The solution of a row from those of the rows below it. */
-static inline void solve_row(const double *lu, const double *inverse, const double *y, double *s, const struct tape *t,
+IN_ROW void solve_row(const double *lu, const double *inverse, const double *y, double *s, const struct tape *t,
                              int i) {
     const int32_t *col = t->col;
     double re = y[2 * i], im = y[2 * i + 1];
@@ -49,13 +57,75 @@ static inline void solve_row(const double *lu, const double *inverse, const doub
     s[2 * i + 1] = re * inverse[2 * i + 1] + im * inverse[2 * i];
 }
 
-static void sweep_down(double *w) {
-    for (int i = 0; i < NB; ++i) sweep_row(w + FACTORS, w + CURRENT, w + SWEPT, OF(w), i);
+/* All rows; and of those that states move, what no state does, which is kept for the stages that follow. */
+IN_ROW void sweep_all(double *w) {
+    const struct reach *r = &OF(w)->reach;
+    const double *lu = w + FACTORS, *b = w + CURRENT;
+    double *y = w + SWEPT, *begun = w + BEGUN;
+    for (int i = 0; i < NB; ++i) sweep_row(lu, b, y, OF(w), i);
+    for (int k = 0; k < r->n_down; ++k) {
+        const int i = r->down[k], bus = PERM[i];
+        take_off(begun + 2 * k, b[bus], b[NB + bus], lu, y, COL, ROW[i], r->from[k]);
+    }
 }
 
-static void solve_up(double *w) {
+/* The rows that states move, from where they do. */
+IN_ROW void sweep_moved_rows(double *w) {
+    const struct reach *r = &OF(w)->reach;
+    const double *lu = w + FACTORS, *b = w + CURRENT, *begun = w + BEGUN;
+    double *y = w + SWEPT;
+    for (int k = 0; k < r->n_down; ++k) {
+        const int i = r->down[k], bus = PERM[i], whole = r->from[k] == ROW[i];
+        const double re = whole ? b[bus] : begun[2 * k], im = whole ? b[NB + bus] : begun[2 * k + 1];
+        take_off(y + 2 * i, re, im, lu, y, COL, r->from[k], DIAG[i]);
+    }
+}
+
+IN_ROW void solve_all(double *w) {
     for (int i = NB - 1; i >= 0; --i) solve_row(w + FACTORS, w + INVERSE, w + SWEPT, w + SOUGHT, OF(w), i);
 }
+
+IN_ROW void place_voltage(double *w, int i) {
+    double *v = SLOT + AT_V;
+    const double *s = w + SOUGHT;
+    v[PERM[i]] = s[2 * i];
+    v[NB + PERM[i]] = s[2 * i + 1];
+}
+
+IN_ROW void solve_wanted(double *w) {
+    const struct reach *r = &OF(w)->reach;
+    for (int k = 0; k < r->n_up; ++k) {
+        solve_row(w + FACTORS, w + INVERSE, w + SWEPT, w + SOUGHT, OF(w), r->up[k]);
+        place_voltage(w, r->up[k]);
+    }
+}
+
+/* A loop over rows also for a processor with wider instructions, which take fewer of them: without contraction, so that
+   each rounds as it does elsewhere. */
+#if defined __clang__ && (defined __x86_64__ || defined _M_X64)
+#include <cpuid.h>
+static int is_wide(void) {
+    enum { OSXSAVE = 1 << 27, AVX2 = 1 << 5, YMM = 0x06 };
+    unsigned a, b, c, d, kept, high;
+    if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & OSXSAVE)) return 0;
+    __asm__ volatile("xgetbv" : "=a"(kept), "=d"(high) : "c"(0));
+    return __get_cpuid_count(7, 0, &a, &b, &c, &d) && b & AVX2 && (kept & YMM) == YMM;
+}
+#define ROWS(name, loop)                                                                                               \
+    __attribute__((target("avx2"))) static void name##_wide(double *w) { loop(w); }                                    \
+    static void name(double *w) {                                                                                      \
+        if (OF(w)->wide) name##_wide(w);                                                                               \
+        else loop(w);                                                                                                  \
+    }
+#else
+static int is_wide(void) { return 0; }
+#define ROWS(name, loop)                                                                                               \
+    static void name(double *w) { loop(w); }
+#endif
+ROWS(sweep_down, sweep_all)
+ROWS(sweep_moved, sweep_moved_rows)
+ROWS(solve_up, solve_all)
+ROWS(solve_reached, solve_wanted)
 
 /* The solution, in the order of elimination, from b by bus: real parts, then imaginary parts. */
 static void through_factors(double *w) {
@@ -134,30 +204,19 @@ static void sweep(double *w) {
     } else if (OF(w)->swept == BUT_STATES) {
         execute_moved(w);
         for (int k = 0; k < r->currents; ++k) take(w, CURRENTS, r->current[k], 1, b + r->current[k]);
-        for (int k = 0; k < r->n_down; ++k) sweep_row(w + FACTORS, b, w + SWEPT, OF(w), r->down[k]);
+        sweep_moved(w);
     }
     OF(w)->swept = ALL;
 }
 
-static void place_voltage(double *w, int i) {
-    double *v = SLOT + AT_V;
-    const double *s = w + SOUGHT;
-    v[PERM[i]] = s[2 * i];
-    v[NB + PERM[i]] = s[2 * i + 1];
-}
-
 /* Voltages in their slots, by bus: real parts, then imaginary parts. ALL, or those WANTED by rates. */
 static void solve_nodes(double *w, int which) {
-    const struct reach *r = &OF(w)->reach;
     sweep(w);
     if (which == ALL) {
         solve_up(w);
         for (int i = 0; i < NB; ++i) place_voltage(w, i);
     } else {
-        for (int k = 0; k < r->n_up; ++k) {
-            solve_row(w + FACTORS, w + INVERSE, w + SWEPT, w + SOUGHT, OF(w), r->up[k]);
-            place_voltage(w, r->up[k]);
-        }
+        solve_reached(w);
     }
     OF(w)->settled = which;
 }

@@ -6,13 +6,14 @@ static void place_reach(double *w, int32_t *at) {
     struct reach *r = &OF(w)->reach;
     const struct section s = OF(w)->size.section[CURRENTS];
     r->down = at;
-    r->up = r->down + NB;
+    r->from = r->down + NB;
+    r->up = r->from + NB;
     r->current = r->up + NB;
     r->run = r->current + 2 * NB;
     r->place = r->run + 2 * s.runs;
     r->operand = (uint32_t *)r->place + s.operands; /* no operation is without one */
 }
-#define REACH_WORDS(s) (4 * (int64_t)(s).size.rank + 2 * (int64_t)(s).size.section[CURRENTS].runs + \
+#define REACH_WORDS(s) (5 * (int64_t)(s).size.rank + 2 * (int64_t)(s).size.section[CURRENTS].runs + \
                         2 * (int64_t)(s).size.section[CURRENTS].operands)
 
 /* Mark the results of the currents that depend on a state, and list them. */
@@ -69,10 +70,12 @@ static void find_rows_down(double *w) {
     memset(mark, 0, 2 * (size_t)NB * sizeof *mark);
     for (int k = 0; k < r->currents; ++k) mark[r->current[k] % NB] = 1;
     for (int i = 0; i < NB; ++i) {
-        int changes = mark[PERM[i]] != 0;
-        for (int q = ROW[i]; q < DIAG[i] && !changes; ++q) changes = swept[COL[q]] != 0;
-        swept[i] = changes;
-        if (changes) r->down[r->n_down++] = i;
+        int q = ROW[i];
+        while (!mark[PERM[i]] && q < DIAG[i] && !swept[COL[q]]) ++q;
+        if (!mark[PERM[i]] && q == DIAG[i]) continue;
+        swept[i] = 1;
+        r->from[r->n_down] = q;
+        r->down[r->n_down++] = i;
     }
 }
 

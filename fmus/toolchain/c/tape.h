@@ -37,7 +37,7 @@ struct header {
 enum { NOTHING, BUT_STATES, WANTED, ALL }; /* all but what states reach; the voltages that rates want */
 
 struct reach { /* as `reach.c` finds it */
-    int32_t *down, *up, *current, *run, *place;
+    int32_t *down, *from, *up, *current, *run, *place; /* from: of each row down, its first element that a state moves */
     uint32_t *operand;
     int32_t n_down, n_up, currents, runs;
 };
@@ -51,6 +51,7 @@ struct tape {
     int swept;   /* NOTHING, BUT_STATES or ALL: which currents and rows down are of what the slots of p, c, u and x hold */
     int settled; /* NOTHING, WANTED or ALL: which slots of v hold the voltages there */
     int outputs_when_read; /* whether a step leaves a network's outputs to whoever reads them */
+    int wide; /* whether the processor has AVX2 */
     int made_of_parameters; /* whether a network's factors are known to be of what the slots of p and c hold */
     const int32_t *stepwise, *given_at, *perm, *row, *col, *diag, *mrow, *mcol;
     struct reach reach;
