@@ -72,9 +72,8 @@ MODES = "modes.csv"
 SUMMARY = "screening.json"
 PAGE = "screening.html"
 
-_CLAUSE = re.compile(
-    r"[:;] (?!no )"
-)  # ends the first clause of a cause; after "power flow:" it goes on
+_CLAUSE = re.compile(r"; |: (?=\d)")
+"""Ends the first clause of a cause: a remedy follows, or further figures."""
 _SCENARIO = re.compile(r"^.*?scenario '[^']*': ")  # the place of a cause, which all items have
 _SHOWN = 4  # kinds of warnings that are listed; the others are counted
 _FEW = 6  # points that are named one by one

@@ -38,7 +38,7 @@ def test_an_outage_without_any_verdict_is_told_by_its_first_point():
         "",
         "–",
         "1 of 1",
-        "no power flow: power flow: no way leads to b1 from",
+        "no power flow: power flow: no way leads to b1 from: 'b3'",
     ]
 
 
