@@ -128,8 +128,10 @@ class Mode(OfEigenvalue):
     def swing_groups(self, states: Iterable[str], least: float = 0.1) -> "SwingGroups":
         """Groups of some states by the angle to the largest one: beside it, against it, and in between.
 
-        ``least``: states that move less than this part of the largest are left out."""
-        together, others = self.swing(states, least)
+        ``least``: states that move less than this part of the largest are left out; where none swings against it that
+        moves more, those against it that move less are kept apart."""
+        known = [s for s in states if s in self.shape]
+        together, others = self.swing(known, least)
         moving = [*together, *others]
         angles = {
             state: math.degrees(cmath.phase(self.shape[state] / self.shape[moving[0]]))
@@ -138,13 +140,30 @@ class Mode(OfEigenvalue):
         alike = tuple(s for s in moving if abs(angles[s]) <= _ALIKE_DEG)
         against = tuple(s for s in moving if abs(angles[s]) >= 180 - _ALIKE_DEG)
         between = {s: angles[s] for s in moving if s not in {*alike, *against}}
-        return SwingGroups(alike, against, between)
+        faint = {} if against or not moving else self._faintly_against(known, moving[0], least)
+        still = bool(moving) and len(known) > len(moving) and not faint
+        return SwingGroups(alike, against, between, faint, still)
+
+    def _faintly_against(
+        self, states: Sequence[str], leader: str, least: float
+    ) -> dict[str, float]:
+        """States against the largest one that move less than a part of it, each with its own part, largest first."""
+        turned = {s: self.shape[s] / self.shape[leader] for s in states}
+        parts = {
+            s: abs(z)
+            for s, z in turned.items()
+            if _FAINTEST <= abs(z) < least and abs(math.degrees(cmath.phase(z))) >= 180 - _ALIKE_DEG
+        }
+        return dict(sorted(parts.items(), key=lambda entry: -entry[1]))
 
     def participation_of(self, states: Iterable[str]) -> float:
         """Participation of some states together."""
         wanted = set(states)
         return sum(factor for name, factor in self.participation if name in wanted)
 
+
+_FAINTEST = 0.01
+"""Part of the largest motion from which on a state is named as the other side of a swing that has no larger one."""
 
 _ALIKE_DEG = 45.0
 """Two states swing together, or against each other, if their angle is within this of 0 or of 180 degrees: then the
@@ -165,23 +184,35 @@ def _sum_by_group(
 
 @dataclass(frozen=True)
 class SwingGroups:
-    """States that swing with the largest one, against it, and those in between with their angles to it [degrees]."""
+    """States that swing with the largest one, against it, and those in between with their angles to it [degrees].
+
+    ``faint``: where none is against it, those that are with less motion than counts, as parts of the largest one's;
+    ``is_still``: whether others are there and none of them is against it even so."""
 
     together: tuple[str, ...]
     against: tuple[str, ...]
     between: dict[str, float]
+    faint: dict[str, float] = field(default_factory=dict)
+    is_still: bool = False
+
+    @property
+    def other_side(self) -> list[str]:
+        """Components against the largest one, those that move little with their part of its motion."""
+        faint = [f"{_component(s)} ({100 * part:.0f} %)" for s, part in self.faint.items()]
+        return [_component(s) for s in self.against] or faint
 
     def words(self, most: Callable[[Sequence[str]], str]) -> str:
         """Who swings against whom: ``sg1, sg2 against sg3; sg4 leads by 87°``; "" if nothing moves.
 
         ``most``: Writes a list of components."""
-        sides = [most([_component(s) for s in side]) for side in (self.together, self.against)]
+        sides = [most([_component(s) for s in self.together]), most(self.other_side)]
         said = " against ".join(side for side in sides if side)
         apart = most([f"{_component(s)} {_ahead(angle)}" for s, angle in self.between.items()])
         if apart:
             return f"{said}; {apart}"
-        is_alone = len(self.together) == 1 and not self.against
-        return f"{said} alone" if is_alone else said
+        if len(self.together) == 1 and not self.other_side:
+            return f"{said} alone"
+        return f"{said}, and the others hardly move" if self.is_still else said
 
 
 def _component(state: str) -> str:

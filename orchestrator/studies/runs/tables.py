@@ -61,6 +61,9 @@ def named_modes(results: Sequence[ModesResult], reference: str | None) -> ShownT
     return mode_tables.named_modes([named_json(r) for r in results], reference)
 
 
+_HARDLY = "the others hardly move"  # where nobody swings against those who swing together
+
+
 @dataclass(frozen=True)
 class _Shape:
     """A mode whose shape is shown, and the words that stand for it."""
@@ -89,7 +92,9 @@ def mode_shapes(
     table = make_table("Mode shapes", *columns, left=len(columns))
     for shape, group in zip(shapes, groups, strict=True):
         r, mode = shape.result, shape.mode
-        sides = [few(side, str) for side in r.swing_of(mode)]
+        together, _ = r.swing_of(mode)
+        hardly = group.is_still and not group.between and len(together) > 1
+        sides = [few(together, str), _HARDLY if hardly else few(group.other_side, str)]
         between = [f"{s.partition('.')[0]} {angle:+.0f}°" for s, angle in group.between.items()]
         sides += [few(between, str)] * across
         row = [shape.label, *[eigenvalue_text(mode.eigenvalue)] * with_values, *sides]

@@ -129,6 +129,27 @@ def test_who_stands_across_is_neither_together_nor_against():
     assert mode.swing_groups([]).words(", ".join) == ""
 
 
+@pytest.mark.parametrize(
+    ("part", "said"),
+    [
+        (0.11, "sg3, sg4 against sg1"),
+        (0.09, "sg3, sg4 against sg1 (9 %)"),
+        (0.011, "sg3, sg4 against sg1 (1 %)"),
+        (0.009, "sg3, sg4, and the others hardly move"),
+        (-0.09, "sg3, sg4, and the others hardly move"),  # with them, not against them
+    ],
+)
+def test_the_other_side_of_a_swing_is_named_also_where_it_moves_little(part, said):
+    """Who counts as moving is as before; an empty other side is what a swing between areas cannot have."""
+    small = part * cmath.exp(1j * math.radians(172))
+    shape = {"sg3.omega": 1.0 + 0j, "sg4.omega": 0.8 + 0j, "sg1.omega": small}
+    mode = Mode(complex(-0.1, 3.5), (("sg3.omega", 1.0),), shape)
+    groups = mode.swing_groups(shape)
+    assert groups.words(", ".join) == said
+    assert groups.against == (("sg1.omega",) if part > 0.1 else ())
+    assert mode.swing_groups(["sg3.omega", "sg4.omega"]).words(", ".join) == "sg3, sg4"
+
+
 def test_a_mode_that_is_handed_out_cannot_be_changed():
     """A shape or a participation that somebody writes into would change a result that others read."""
     (mode,) = find_modes(model(OSCILLATOR, None))
