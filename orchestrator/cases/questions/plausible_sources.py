@@ -30,6 +30,7 @@ _SHOWN = 3  # machines beyond which one is compared with the others
 _LITTLE = 0.05  # loading below which it is questioned [pu]
 _SAME = 0.05  # part by which two powers may differ
 _ROUNDING = 1e-3  # part of the converters' power by which six digits of P_0 differ at most
+_NO_DIFFERENCE = 0.1  # of the file's units [MW]: the rounding of their powers, beside which converters may feed 0
 _COMPARED = 8  # converters from which on chance would make some of them fit
 _ALIKE = 2.0  # factor within which machines are alike
 _UNLIKE = 5.0  # factor from which a machine is unlike the others
@@ -185,7 +186,7 @@ def _own_converters(draft: Draft) -> Iterator[UnusualValue]:
     if (
         own
         and not draft.given.from_outside
-        and abs(less) > _SAME * abs(fed)
+        and abs(less) > max(_SAME * abs(fed), _NO_DIFFERENCE)
         and abs(fed - less) > _SAME * abs(fed)
         and not _is_of_some(less, [*own.values()])
     ):

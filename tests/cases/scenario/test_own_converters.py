@@ -57,7 +57,7 @@ def test_a_source_that_stands_in_for_a_converter_feeds_as_well(monkeypatch, besi
 
 
 @pytest.mark.parametrize("at_slack", [1, 2, 6])
-@pytest.mark.parametrize(("left", "asked"), [(0.0, False), (300.0, True)])
+@pytest.mark.parametrize(("left", "asked"), [(0.0, False), (2e-12, False), (300.0, True)])
 def test_units_at_the_slack_are_not_compared_however_many(monkeypatch, at_slack, left, asked):
     """The slack's power follows from all others': only what a unit elsewhere feeds less is asked about."""
     found = questions(monkeypatch, 0.0, left, at_slack=at_slack)
