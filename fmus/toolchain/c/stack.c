@@ -15,14 +15,15 @@ static int is_of(const struct beside *b, struct instance *const *s) {
     return 1;
 }
 
-/* What the first instance keeps for all, made where they are not as they were; NULL without memory. */
+/* What the first instance keeps for all, made where they are not as they were; NULL without memory. Only its own memory
+   is read: an instance that led another of them before may be gone. */
 static struct beside *parameters_of(struct instance *const *s) {
     struct instance *first = s[0];
-    if (first->beside && is_of(first->beside, s)) return first->beside;
     if (!first->own_beside) first->own_beside = calloc(1, sizeof(struct beside) + _Alignof(struct beside));
     if (!first->own_beside) return NULL;
     const uintptr_t most = (uintptr_t)first->own_beside + _Alignof(struct beside);
     struct beside *b = (struct beside *)(most - most % _Alignof(struct beside));
+    if (is_of(b, s)) return b;
     for (int lane = 0; lane < LANES; ++lane) {
         const double *z = s[lane]->z, *fixed = s[lane]->work + AT_FIXED;
         double *p = (double *)b->p + lane, *h = (double *)b->h + lane;
