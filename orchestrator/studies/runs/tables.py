@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rich.table import Table
 
 from orchestrator.cases.scenario.flow_figures import power_flow_json
+from orchestrator.core.options import Option
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.output.report import mode_tables
 from orchestrator.output.report.column_table import ShownTable
@@ -103,7 +104,7 @@ def mode_shapes(
         table.add_row(*row)
     rest = 0 if names else sum(len(r.modes) for r, _ in _unlike(results)) - len(shapes)
     if rest:
-        table.caption = f"and {rest} more, swings with more damping and controls: --details"
+        table.caption = f"and {rest} more, swings with more damping and controls: " + Option.DETAILS
         table.caption_justify = "left"
     return table
 

@@ -118,10 +118,19 @@ def test_the_defaults_of_every_model_are_plausible_and_obey_the_rules(name):
         )
 
 
+def parts_of(record):
+    """The parts of a machine that has what a record is of, with what that needs beside it."""
+    if record.kind == "machine":
+        return {"machine": record.part}
+    if record.kind == "supervisor":  # a loop around a governor, at the end of its name
+        return {"exciter": "sexs", "governor": f"tgov1_{record.part}"}
+    return {"exciter": "sexs", record.kind: record.part}
+
+
 RECORDED_PARTS = [
-    {"machine": r.part} if r.kind == "machine" else {"exciter": "sexs"} | {r.kind: r.part}
-    for r in DYR_RECORDS.values()
-    if r.kind != "compensator"  # which is parameters of an exciter, and no part
+    parts_of(record)
+    for record in DYR_RECORDS.values()
+    if record.kind != "compensator"  # which is parameters of an exciter, and no part
 ]
 
 

@@ -492,6 +492,8 @@ _ELSEWHERE = (
     "without which PSS/E refuses the file",  # as above
     "what the control does to a mode",  # tests/cases/networks/psse/test_dc_line_models.py
     "of whose fields no public source has the order",  # tests/cases/networks/psse/test_dyr_converters.py
+    "moves the power reference of the governor",  # tests/cases/networks/psse/test_load_controllers.py
+    "correct the record, or write",  # tests/cases/networks/psse/test_composite_loads.py
     "study each on its own",  # tests/cases/networks/cgmes/test_cgmes.py, by the same function
 )
 """Remedies that other tests type, or that no small network asks for."""
