@@ -5,11 +5,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+from orchestrator.core.errors import AnalysisError
 from orchestrator.linear.models import hub_elimination, linear_model
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.slope_linearization import _Point, linearize_slopes
 from orchestrator.linear.spectra import mode_refinement
-from orchestrator.linear.spectra.critical_modes import DENSE
+from orchestrator.linear.spectra.critical_modes import DENSE, find_critical_modes
 from orchestrator.linear.spectra.mode_refinement import RefinedModes, misses_modes, refine
 from orchestrator.linear.spectra.mode_tracking import ModeSet
 from orchestrator.linear.spectra.modes import find_spectrum
@@ -166,6 +167,40 @@ def test_what_is_found_anew_is_the_same_by_a_search_and_among_all_eigenvalues(
     # some have the same damping, and no order of their own
     assert sorted(critical, key=np.imag) == pytest.approx(sorted(held, key=np.imag))
     assert found.growing_elsewhere == 0
+
+
+@pytest.fixture
+def large(monkeypatch):
+    """A system whose modes are searched for as in a large one, and never among all eigenvalues."""
+    monkeypatch.setattr(hub_elimination, "LEAST_HUB", 50)
+    monkeypatch.setattr(linear_model, "LEAST_IN_BLOCKS", 0)
+    for name in ("MOST_COUNTED", "DENSE"):
+        monkeypatch.setattr(f"orchestrator.studies.screening.modes.{name}", 0)
+    monkeypatch.setattr("orchestrator.studies.screening.modes._whole", None)
+    return system(KNOWN, seed=3)  # whose hub nobody asked for before
+
+
+@pytest.mark.slow
+def test_many_modes_of_a_large_neighbour_are_searched_anew(large, monkeypatch):
+    neighbour = modes_of(large)
+    monkeypatch.setattr("orchestrator.studies.screening.modes.MOST_REFINED", len(KNOWN) - 1)
+    monkeypatch.setattr("orchestrator.studies.screening.modes.refine", None)
+    found = find_modes_here(large, np.zeros(0), REGION, neighbour, count=False)
+    assert found.searched
+    critical = [found.modes.eigenvalues[k] for k in found.critical(REGION)]
+    assert sorted(critical, key=np.imag) == pytest.approx(sorted(KNOWN, key=np.imag))
+
+
+def test_a_mode_that_the_search_of_a_large_system_misses_is_no_verdict(large, monkeypatch):
+    """Planted: the search leaves out one mode. All eigenvalues would take hours."""
+    search = "orchestrator.studies.screening.modes.find_critical_modes"
+
+    def one_less(*arguments):
+        return find_critical_modes(*arguments)[1:]
+
+    monkeypatch.setattr(search, one_less)
+    with pytest.raises(AnalysisError, match=r"missed some, the first near .* narrower range"):
+        find_modes_here(large, np.zeros(0), REGION, None, count=False)
 
 
 def test_nothing_is_searched_where_nothing_is_lost():
