@@ -136,6 +136,7 @@ _PATTERNS = {"match", "search", "fullmatch", "findall", "finditer", "sub"}
 
 ALLOWED = {
     "orchestrator/simulation/federation/helics_calls.py": 1,  # what the library of HELICS says
+    "orchestrator/studies/screening/view.py": 1,  # a cause in a table's cell; items.csv has it whole
 }
 """Files that may look into a text, and how often."""
 
