@@ -11,7 +11,8 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 
 from orchestrator.face.explore.server import Explorer
-from tests.face.explore.test_page import CHROMIUM, OPTIONS, add, computed, opened
+from tests.face.explore.test_page import add, computed, opened
+from tests.support.chromium import CHROMIUM, OPTIONS
 
 DRAGS = 10_000
 

@@ -12,8 +12,8 @@ from orchestrator.output.report.html import elements
 from orchestrator.studies.immittance import ratio_page
 from tests.benchmarks import wasm
 from tests.benchmarks.live_pages import pages_with_answers
-from tests.output.report.test_html import CHROMIUM, OPTIONS
 from tests.pages.markdown import ROOT, links
+from tests.support.chromium import running_browser
 
 GUIDE = ROOT / ".docs" / "how-to" / "look-first.md"
 PAGES = sorted((ROOT / ".docs" / "live").glob("*.html"))
@@ -32,13 +32,8 @@ def saved(path):
 @pytest.fixture(scope="module")
 def browser():
     """One for all tests of these pages: its start takes longer than most of them."""
-    if CHROMIUM is None:
-        pytest.skip("needs chromium (Debian: apt-get install chromium)")
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as tools:
-        found = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+    with running_browser() as found:
         yield found
-        found.close()
 
 
 @pytest.fixture

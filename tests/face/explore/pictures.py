@@ -8,7 +8,8 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 from orchestrator.face.explore.server import Explorer
-from tests.face.explore.test_page import CHROMIUM, OPTIONS, add, computed, opened
+from tests.face.explore.test_page import add, computed, opened
+from tests.support.chromium import CHROMIUM, OPTIONS
 
 PLACE = Path(__file__).parents[3] / ".docs" / "how-to" / "pictures"
 

@@ -4,7 +4,6 @@ import json
 import math
 import os
 import re
-import shutil
 import signal
 import threading
 from contextlib import contextmanager
@@ -18,27 +17,13 @@ from orchestrator.face.explore.opened import opened as opened_folder
 from orchestrator.face.explore.server import Explorer
 from orchestrator.face.explore.worker import Desk
 from tests.studies.certification.test_issued import issued
+from tests.support.chromium import needs_chromium, running_browser
 
 __all__ = ["issued"]
 
 pytestmark = pytest.mark.slow
 
-CHROMIUM = (
-    shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-)
-OPTIONS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--disable-quic",
-]
 PATIENCE = 60_000  # [ms]
-needs_chromium = pytest.mark.skipif(
-    CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)"
-)
 
 SEARCH_MS = 300_000
 """Longest that a search of some 45 spectra may take [ms]: 10 s of processor time, and machines have other work."""
@@ -46,15 +31,8 @@ SEARCH_MS = 300_000
 
 @pytest.fixture(scope="module")
 def browser():
-    if CHROMIUM is None:
-        pytest.skip("needs chromium (Debian: apt-get install chromium)")
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as tools:
-        found = tools.chromium.launch(
-            executable_path=CHROMIUM, args=[*OPTIONS, "--js-flags=--expose-gc"]
-        )
+    with running_browser("--js-flags=--expose-gc") as found:
         yield found
-        found.close()
 
 
 @contextmanager

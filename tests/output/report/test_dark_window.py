@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.output.report.html.charts import ChartCurve, legend, line_chart
 from orchestrator.output.report.html.elements import Figures, document, table
-from tests.output.report.test_html import CHROMIUM, OPTIONS
+from tests.support.chromium import running_browser
 
 LEAST_CONTRAST = 4.5
 """Of text, by the Web Content Accessibility Guidelines 2.1, level AA."""
@@ -39,9 +39,6 @@ def contrast(one, other):
 @pytest.fixture(scope="module")
 def texts(tmp_path_factory):
     """Colours of every text, and of what is behind it: in a light window, in a dark one, and on paper."""
-    if CHROMIUM is None:
-        pytest.skip("needs chromium (Debian: apt-get install chromium)")
-    playwright = pytest.importorskip("playwright.sync_api")
     x = np.array([0.0, 1.0])
     chart = legend([("a", "#4d4d4d")]) + line_chart(
         "c", "x", "y", [ChartCurve("a", "#4d4d4d", x, x)]
@@ -54,8 +51,7 @@ def texts(tmp_path_factory):
     page = tmp_path_factory.mktemp("dark") / "page.html"
     page.write_text(document("A page", "kind", findings, [("Part", content)]), encoding="utf-8")
     found = {}
-    with playwright.sync_playwright() as tools:
-        browser = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+    with running_browser() as browser:
         view = browser.new_page()
         view.goto(page.as_uri())
         for name, media in (
@@ -65,7 +61,6 @@ def texts(tmp_path_factory):
         ):
             view.emulate_media(**media)
             found[name] = view.evaluate(OF_TEXTS)
-        browser.close()
     return found
 
 

@@ -1,7 +1,6 @@
 """The report as a page: what it holds, and what a browser makes of it."""
 
 import re
-import shutil
 
 import numpy as np
 import pytest
@@ -17,20 +16,7 @@ from orchestrator.output.report.html.charts import (
     thinned,
 )
 from orchestrator.output.report.html.page import write_report
-
-CHROMIUM = (
-    shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-)
-# No services of its own: the page is a file, and tests run where there is no network.
-OPTIONS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--disable-quic",
-]
+from tests.support.chromium import needs_chromium, running_browser
 
 
 @pytest.fixture(scope="module")
@@ -92,12 +78,10 @@ def test_the_page_needs_nothing_but_itself(page):
     assert 'name = "two_area"' in text.replace("&quot;", '"')
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
+@needs_chromium
 def test_a_browser_shows_it_without_errors_answers_the_pointer_and_prints(page, tmp_path):
     pypdf = pytest.importorskip("pypdf")
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as tools:
-        browser = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+    with running_browser() as browser:
         view = browser.new_page(viewport={"width": 1100, "height": 900})
         errors = []
         view.on("pageerror", lambda error: errors.append(str(error)))
@@ -127,7 +111,6 @@ def test_a_browser_shows_it_without_errors_answers_the_pointer_and_prints(page, 
         assert "linear" in tooltip.inner_text()
 
         view.pdf(path=tmp_path / "report.pdf", format="A4")
-        browser.close()
     assert errors == []
     sheets = pypdf.PdfReader(tmp_path / "report.pdf").pages
     assert 3 < len(sheets) < 20
