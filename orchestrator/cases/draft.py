@@ -144,6 +144,10 @@ class Draft:
     def note(self, place: str, text: str, kind: ErrorKind = ErrorKind.VALUES) -> None:
         self._add(Problem(place, text, kind))
 
+    def note_of_scenario(self, place: str, cause: str, kind: ErrorKind = ErrorKind.VALUES) -> None:
+        """Add a problem that others of the case's scenarios may not have."""
+        self._add(Problem.of_scenario(place, self.given.name, cause, kind))
+
     def note_unread(self, place: str, error: InputError) -> None:
         """Add the problem of a network's file, whose error may name the record; without it there is no network."""
         self.found.network_failed = True

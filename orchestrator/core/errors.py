@@ -194,6 +194,14 @@ class Problem:
     record: str = ""  # file and record that the text begins with, where ``place`` is the key that names the file
     # the place with the first of many records that it lists, and how many more there are; "" where it lists few
     place_in_short: str = ""
+    cause: str = ""  # the text without the scenario that it names first; "" where it names none
+
+    @classmethod
+    def of_scenario(
+        cls, place: str, scenario: str, cause: str, kind: ErrorKind = ErrorKind.VALUES
+    ) -> Self:
+        """Return the problem of one scenario, which its text names first."""
+        return cls(place, f"scenario {scenario!r}: " + cause, kind, cause=cause)
 
     @property
     def message(self) -> str:

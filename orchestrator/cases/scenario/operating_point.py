@@ -85,10 +85,10 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
         )
     except InputError as error:
         kind = ErrorKind.VALUES if error.kind is ErrorKind.INPUT else error.kind
-        text = f"scenario {draft.given.name!r}: {error}"
+        cause = str(error)
         if kind is ErrorKind.START:  # units at their limits
-            text += _cause(draft, 0.0)
-        draft.note(draft.given.place("power_flow"), text, kind)
+            cause += _cause(draft, 0.0)
+        draft.note_of_scenario(draft.given.place("power_flow"), cause, kind)
         return None
     start_measured_points(draft, flow)
     start_plants(draft, flow)

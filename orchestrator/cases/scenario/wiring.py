@@ -136,10 +136,7 @@ def check_inputs(draft: Draft) -> None:
         text = (
             f"nothing feeds the input {endpoint}; connect it, or give it a constant under 'inputs'"
         )
-        draft.note(
-            draft.given.place("components", endpoint.component),
-            f"scenario {draft.given.name!r}: {text}",
-        )
+        draft.note_of_scenario(draft.given.place("components", endpoint.component), text)
 
 
 def _connect_to_bus(draft: Draft, name: str, bus: str, taken: list[str]) -> None:

@@ -182,8 +182,8 @@ def _points(
         except (
             Exception
         ) as error:  # an error that nobody expected must neither end the other points nor be hidden
-            kind, text, lasting = failure(error, item)
-            found = PointModes(kind, text, warnings, lasting=lasting)
+            status, kept = failure(error, item)
+            found = PointModes(status, kept.text, warnings, lasting=kept.lasting)
         yield found
 
 

@@ -47,14 +47,16 @@ def start_errors(prepared: PreparedScenario, error: ComponentError) -> StartErro
         if refusal is None or not refuses_to_start(refusal) or name not in prepared.places:
             continue
         limits = _wider_limits(name, prepared.system.components[name])
-        text = _text(prepared, refusal, name) + _typed(limits)
-        others.append(Problem(prepared.places[name], text, ErrorKind.START))
+        cause = _cause(prepared, refusal, name) + _typed(limits)
+        place = prepared.places[name]
+        others.append(Problem.of_scenario(place, prepared.name, cause, ErrorKind.START))
         wider.append(limits)
         stopped.append(name)
     shown, rest = others[:_MOST_OTHERS], others[_MOST_OTHERS:]
     if rest:
-        text = f"scenario {prepared.name!r}: {len(rest)} more units cannot start from their operating point"
-        shown.append(Problem(prepared.case.source, text, ErrorKind.START))
+        cause = f"{len(rest)} more units cannot start from their operating point"
+        source = prepared.case.source
+        shown.append(Problem.of_scenario(source, prepared.name, cause, ErrorKind.START))
     every = (
         {name: value for limits in wider for name, value in limits.items()} if all(wider) else {}
     )
@@ -96,23 +98,23 @@ def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError
         return None
     name, plan = error.component, prepared.system.components[error.component]
     computed = prepared.power_flow is not None and name in prepared.power_flow.powers
-    text = _text(prepared, error, name)
+    cause = _cause(prepared, error, name)
     if computed and {"P_0", "Q_0", "S_n"} <= {*plan.description.variables}:
         asked = abs(complex(plan.number("P_0"), plan.number("Q_0")))
         if _share(plan) > 1 or asked > _FULL:
-            text += (
+            cause += (
                 ". Give others more of the power (P_0 of units; a screening of outages shares it by itself), lower the "
                 "loads or the reactive power around it, or correct a limit that is wrong in its data"
             )
         if _share(plan) <= 1:  # a load below zero leaves a unit less active power, never more
             grid = prepared.system.components.get(prepared.grid)
             fed = feeding_loads(prepared.network, grid, plan.number("S_n"))
-            text += f"; {fed}" if fed else ""
+            cause += f"; {fed}" if fed else ""
     limits = _wider_limits(name, plan)
-    text += _typed(limits)
+    cause += _typed(limits)
     # The same values are refused again by a model of ours; an FMU of others may lack a licence today.
     kind = ErrorKind.START if is_ours(plan.description.path) else ErrorKind.FMU
-    problem = Problem(prepared.places[name], text, kind)
+    problem = Problem.of_scenario(prepared.places[name], prepared.name, cause, kind)
     return StartError(prepared.case.source, problem, name, wider=limits)
 
 
@@ -139,7 +141,7 @@ def _share(plan: ComponentPlan) -> float:
     return plan.number("P_0") / most if most > 0 else 0.0
 
 
-def _text(prepared: PreparedScenario, error: ComponentError, name: str) -> str:
+def _cause(prepared: PreparedScenario, error: ComponentError, name: str) -> str:
     """Return the reason that a component gives why it cannot start, with its operating point."""
     plan = prepared.system.components[name]
     said = error.log.removeprefix(f"{name}: ")
@@ -147,11 +149,11 @@ def _text(prepared: PreparedScenario, error: ComponentError, name: str) -> str:
     said = said or "the FMU says no more than that its initialisation failed"
     share, there = _share(plan), {*plan.description.variables}
     need = f"would need {100 * share:.0f} % of what its limits allow, and " if share > 1 else ""
-    text = f"scenario {prepared.name!r}: {name} {need}cannot start: {said}"
+    cause = f"{name} {need}cannot start: {said}"
     if {"P_0", "Q_0", "S_n"} <= there:
         computed = prepared.power_flow is not None and name in prepared.power_flow.powers
         by = "the power flow asks it for" if computed else "it is to start at"
         voltage = f" at v = {plan.number('v_0'):.4g} pu" if "v_0" in there else ""
         powers = f"P_0 = {plan.number('P_0'):.4g} and Q_0 = {plan.number('Q_0'):.4g} pu"
-        text += f"; {by} {powers} of S_n = {plan.number('S_n'):g} MVA{voltage}"
-    return text
+        cause += f"; {by} {powers} of S_n = {plan.number('S_n'):g} MVA{voltage}"
+    return cause

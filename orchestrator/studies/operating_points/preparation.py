@@ -284,17 +284,18 @@ def _power_of(units: Collection[str], before: PreparedScenario) -> float:
     )
 
 
-def failure(error: Exception, item: Item) -> tuple[Status, str, bool]:
+def failure(error: Exception, item: Item) -> tuple[Status, Failure]:
+    """Return what becomes of an item that ends with an error, and the error as it is kept."""
     found = Failure.of(error)
     if not isinstance(error, (CosimError, np.linalg.LinAlgError)):
-        return Status.INTERNAL, unexpected(error), found.lasting
+        return Status.INTERNAL, replace(found, text=unexpected(error))
     status = Status.of(found)
     if isinstance(error, StartError) and status is Status.STEADY_STATE:
         given = {
             key.partition(".")[2] for key in item.values if key.partition(".")[0] == error.component
         }
         status = Status.VALUES if given - _OPERATING else status
-    return status, found.text, found.lasting
+    return status, found
 
 
 def unexpected(error: Exception) -> str:

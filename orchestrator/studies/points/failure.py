@@ -16,14 +16,16 @@ class Failure:
     kind: ErrorKind
     text: str
     lasting: bool
+    cause: str = ""  # the text without key and scenario; "" where it names none
 
     @classmethod
     def of(cls, error: BaseException) -> Self:
         if isinstance(error, CosimError):
-            text = error.message
-            if isinstance(error, CaseError):
-                text = joined("; ", [problem.message for problem in error.problems])
-            return cls(error.kind, text, error.kind.lasting)
+            if not isinstance(error, CaseError):
+                return cls(error.kind, error.message, error.kind.lasting)
+            text = joined("; ", [problem.message for problem in error.problems])
+            cause = joined("; ", [problem.cause or problem.text for problem in error.problems])
+            return cls(error.kind, text, error.kind.lasting, cause)
         if isinstance(error, np.linalg.LinAlgError):
             return cls(ErrorKind.ANALYSIS, f"no eigenvalues: {error}", True)
         return cls(ErrorKind.OTHER, f"{type(error).__name__}: {error}", False)

@@ -80,7 +80,7 @@ class StretchTask(Task):
         )
 
     def failed(self, failure: Failure) -> StretchRecord:
-        one = ItemRecord(Status.of(failure), failure.text, lasting=failure.lasting)
+        one = ItemRecord(Status.of(failure), failure.text, failure.cause, lasting=failure.lasting)
         return StretchRecord((one,) * (1 + len(self.items)))
 
 
@@ -212,9 +212,18 @@ class _Worker:
             run = runs.run(item, {first_bus(one, prepared) for one in losing})
             return replace(record, run=run)
         except Exception as error:  # as that of an item: it must neither end others nor be hidden
-            kind, text, lasting = failure(error, item)
-            told = f"the run of the outage: {text}"
-            return replace(record, status=kind, text=told, stable=None, lasting=lasting)
+            status, kept = failure(error, item)
+            told, cause = (
+                f"the run of the outage: {text}" for text in (kept.text, kept.cause or kept.text)
+            )
+            return replace(
+                record,
+                status=status,
+                text=told,
+                cause=cause,
+                stable=None,
+                lasting=kept.lasting,
+            )
 
     def _item(self, item: Item, neighbour: FoundModes | None, *, count: bool) -> _Result:
         warnings: tuple[str, ...] = ()
@@ -253,15 +262,16 @@ class _Worker:
         except (
             Exception
         ) as error:  # an error that nobody expected must neither end the other points nor be hidden
-            kind, text, lasting = failure(error, item)
+            status, kept = failure(error, item)
             record = ItemRecord(
-                kind,
-                text,
+                status,
+                kept.text,
+                kept.cause,
                 warnings,
                 loadings=loaded,
                 outliers=outside,
                 has_flow=flow is not None,
-                lasting=lasting,
+                lasting=kept.lasting,
             )
             return _Result(record)
 

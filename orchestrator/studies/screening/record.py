@@ -61,6 +61,7 @@ class ItemRecord:
     # status, text: what became of it, and why; of a computed one what was lost and who feeds it instead
     status: Status
     text: str = ""
+    cause: str = ""  # the text of a failure without key and scenario; "" where it names none
     warnings: tuple[str, ...] = ()
     beyond: dict[str, float] = field(default_factory=dict)  # units beyond their rating [pu of it]
     # those of the warnings that ask about these ratings

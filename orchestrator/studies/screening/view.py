@@ -74,7 +74,6 @@ PAGE = "screening.html"
 
 _CLAUSE = re.compile(r"; |: (?=\d)")
 """Ends the first clause of a cause: a remedy follows, or further figures."""
-_SCENARIO = re.compile(r"^.*?scenario '[^']*': ")  # the place of a cause, which all items have
 _SHOWN = 4  # kinds of warnings that are listed; the others are counted
 _FEW = 6  # points that are named one by one
 _NAMED = 40  # outages of one cause that are named: a planner looks for each; items.csv has them all
@@ -338,8 +337,7 @@ def _why_unjudged(row: OutageRow) -> str:
     if not row.unjudged:
         return ""
     record = row.unjudged[0].record
-    cause = _SCENARIO.sub("", record.text)
-    return f"{record.status}: {_CLAUSE.split(cause, maxsplit=1)[0]}"
+    return f"{record.status}: {_CLAUSE.split(record.cause or record.text, maxsplit=1)[0]}"
 
 
 def _who(mode: ModeAt | None) -> str:

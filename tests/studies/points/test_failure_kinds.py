@@ -62,9 +62,9 @@ TEXT = (
     ],
 )
 def test_a_status_follows_from_the_kind_alone(error, status, lasting):
-    found, text, lasts = failure(error, Item(0, 0, {"sg1.P_0": 1.3, "sg2.H": 3.0}, ()))
-    assert (found, lasts) == (status, lasting)
-    assert "the power flow asks it for more" in text
+    found, told = failure(error, Item(0, 0, {"sg1.P_0": 1.3, "sg2.H": 3.0}, ()))
+    assert (found, told.lasting) == (status, lasting)
+    assert "the power flow asks it for more" in told.text
     kept = Failure.of(error)
     assert unpacked(Failure, *packed(kept)) == kept
 
@@ -103,6 +103,8 @@ def test_an_overloaded_converter_has_one_status_opened_anew_and_reset(tmp_path):
     assert (opened.status, opened.text, opened.lasting) == (reset.status, reset.text, reset.lasting)
     assert opened.status is Status.STEADY_STATE
     assert opened.lasting
+    assert opened.cause.startswith("gfor would need ")
+    assert opened.text.endswith(f"scenario 'gfor': {opened.cause}")
 
 
 # -- no English decides ------------------------------------------------------------------------------
@@ -136,7 +138,6 @@ _PATTERNS = {"match", "search", "fullmatch", "findall", "finditer", "sub"}
 
 ALLOWED = {
     "orchestrator/simulation/federation/helics_calls.py": 1,  # what the library of HELICS says
-    "orchestrator/studies/screening/view.py": 1,  # a cause in a table's cell; items.csv has it whole
 }
 """Files that may look into a text, and how often."""
 
