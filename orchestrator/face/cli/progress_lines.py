@@ -9,8 +9,7 @@ from typing import Self
 from rich.console import Console
 
 from orchestrator.face.cli.terminal import make_errors
-from orchestrator.studies.points.doing import doing, tell_doing
-from orchestrator.studies.points.parts_done import parts_done
+from orchestrator.studies.points.under_way import doing, parts_done
 
 EVERY = 30.0  # from one line to the next [s]: a log of a night has some hundred
 _MINUTE = 60.0  # [s]
@@ -38,7 +37,6 @@ class ProgressLines:
         self._done, self._total = done, total
 
     def __enter__(self) -> Self:
-        tell_doing()
         if self._shown:
             self._thread.start()
         return self
@@ -50,22 +48,21 @@ class ProgressLines:
         trace: TracebackType | None,
     ) -> None:
         self._ended.set()
-        tell_doing()
         if self._shown:
             self._thread.join()
 
     def line(self) -> str:
         """Return what is said now; while nothing is done since the line before, how long it takes is not guessed."""
-        passed, now = monotonic() - self._began, doing()
+        passed, (doing_now, part) = monotonic() - self._began, doing()
         if not self._total:
             return f"{self._name}: preparing, {_in_words(passed)}"
         stored = self._stored or 0
         # of a task that is under way, some parts may be done; all are not before its record is there
         under_way = min(stored + parts_done(), self._total - 1)
         done = max(self._done, under_way)
-        reached = done + now.part
+        reached = done + part
         still, self._told = reached == self._told, reached
-        at, what = "still at " if still else "", f" ({now.text})" if now.text else ""
+        at, what = "still at " if still else "", f" ({doing_now})" if doing_now else ""
         text = (
             f"{self._name}: {at}{done} of {self._total} {self._counted}{what}, {_in_words(passed)}"
         )

@@ -30,10 +30,10 @@ from orchestrator.face.cli.verdict import add_verdict_argument
 from orchestrator.output.report.progress import progress_bar
 from orchestrator.output.results.lock import hold_folder
 from orchestrator.studies.points.executor import Executor
-from orchestrator.studies.points.parts_done import counting
 from orchestrator.studies.points.points import CountReport
 from orchestrator.studies.points.store import POINTS, any_kept
 from orchestrator.studies.points.study import PointStudy, StudyAtOnce
+from orchestrator.studies.points.under_way import counting
 
 Result = TypeVar("Result")
 
@@ -110,6 +110,7 @@ def _run_at_once(name: str, study: Simple, options: argparse.Namespace) -> int:
     folder = made_folder(options.out, "--out") if getattr(options, "out", None) else None
     console = make_console(stderr=options.json)
     with (
+        counting(),
         progress_lines(console, name, study.counted) as lines,
         shown_progress(study.counted.capitalize(), shown=not options.json) as report,
     ):

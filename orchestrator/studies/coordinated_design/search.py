@@ -18,7 +18,7 @@ from orchestrator.studies.coordinated_design.open_loops import PodPlace
 from orchestrator.studies.coordinated_design.settings import PodGroup, SettingSpace
 from orchestrator.studies.pod_design.closed_loop import PodSetting
 from orchestrator.studies.pod_design.lead_lag import angle_deg, compensation_deg
-from orchestrator.studies.points.doing import tell_doing
+from orchestrator.studies.points.under_way import tell_doing
 from orchestrator.studies.sensitivities.sensitivities import damping_change
 
 # of where the sensitivities are trusted, as parts of the ranges

@@ -61,10 +61,10 @@ from orchestrator.studies.pod_design.target import (
     require_controllers,
     with_controller,
 )
-from orchestrator.studies.points.doing import tell_doing
 from orchestrator.studies.points.points import Work, nobody
 from orchestrator.studies.points.request import POINTS_FILE, OverCluster, of_scenario, of_values
 from orchestrator.studies.points.task import StudyCase
+from orchestrator.studies.points.under_way import tell_doing
 
 ALL = "all"  # stands for all electromechanical modes
 # damping ratio beyond the wanted one with which a search for the smallest gain is content

@@ -29,7 +29,7 @@ from orchestrator.studies.points.lost_workers import (
     try_again,
 )
 from orchestrator.studies.points.main_guard import require_main_guard
-from orchestrator.studies.points.parts_done import join, tally
+from orchestrator.studies.points.under_way import join, tally
 
 _QUEUE_PER_WORKER = 2
 """Number of tasks that each worker is given at once. The second task is ready when the first one ends, which keeps the

@@ -29,8 +29,8 @@ from orchestrator.studies.operating_points.preparation import (
 from orchestrator.studies.operating_points.widening import StartedItem, started
 from orchestrator.studies.points.codec import plain
 from orchestrator.studies.points.failure import Failure
-from orchestrator.studies.points.parts_done import tell_part
 from orchestrator.studies.points.task import Task, computed
+from orchestrator.studies.points.under_way import tell_part
 from orchestrator.studies.screening.modes import (
     MOST_COUNTED,
     CriticalRegion,

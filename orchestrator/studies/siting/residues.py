@@ -21,7 +21,7 @@ from orchestrator.linear.spectra.critical_modes import DENSE
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.studies.modes.modes import ModesResult, modes_from, running
 from orchestrator.studies.operating_points.widening import Widening
-from orchestrator.studies.points.doing import tell_doing
+from orchestrator.studies.points.under_way import tell_doing
 
 # Parts of the time that a situation takes, for its progress: measured in 240 buses and 103 machines
 _LINEAR = 0.02  # to the linear model

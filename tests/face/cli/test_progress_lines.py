@@ -9,8 +9,14 @@ import pytest
 from orchestrator.cases.case import load_case
 from orchestrator.face.cli import explore, main, progress_lines
 from orchestrator.face.cli.progress_lines import ProgressLines
-from orchestrator.studies.points.doing import tell_doing
-from orchestrator.studies.points.parts_done import counting, join, parts_done, tally, tell_part
+from orchestrator.studies.points.under_way import (
+    counting,
+    join,
+    parts_done,
+    tally,
+    tell_doing,
+    tell_part,
+)
 from orchestrator.studies.siting import residues
 from orchestrator.studies.siting.machines import find_machines
 from orchestrator.studies.siting.study import SiteRequest, find_sites
@@ -150,7 +156,8 @@ def test_what_is_being_done_is_told_with_its_part_of_the_next_one(monkeypatch):
     """A search for places stood at "0 of 4 places" while it computed the intact network."""
     now = [100.0]
     monkeypatch.setattr(progress_lines, "monotonic", lambda: now[0])
-    with ProgressLines("site", "places", shown=False) as lines:
+    lines = ProgressLines("site", "places", shown=False)
+    with counting():
         lines.report(0, 4)
         tell_doing("intact: eigenvalues", 0.25)
         now[0] += 30.0
