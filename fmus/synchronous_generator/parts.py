@@ -11,6 +11,7 @@ from fmus.synchronous_generator.excitation.common import Exciter
 from fmus.synchronous_generator.excitation.compound import esst2a, esst3a, ieeet3
 from fmus.synchronous_generator.excitation.integral import ac7b, dc4b, expic1
 from fmus.synchronous_generator.excitation.nve import exni
+from fmus.synchronous_generator.excitation.rexsys import rexsys
 from fmus.synchronous_generator.excitation.rotating import (
     ac1a,
     ac4a,
@@ -102,6 +103,7 @@ EXCITERS: dict[str, Exciter] = {
     "ac4a": ac4a,
     "ac5a": ac5a,
     "exbas": exbas,
+    "rexsys": rexsys,
     "ieeet3": ieeet3,
     "st1a": st1a,
     "esst2a": esst2a,

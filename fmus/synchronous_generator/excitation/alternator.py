@@ -139,12 +139,20 @@ class Alternator:
     @property
     def constant(self) -> Expr:
         """K_E + S_E(V_E) [pu], at least a small number."""
-        return fmax(self.p.K_E + self.curve.part(self.V_E) / fmax(self.V_E, _LEAST), _LEAST)
+        return self._constant(self.V_E)
+
+    @property
+    def constant_0(self) -> Expr:
+        """K_E + S_E(V_E) [pu] in steady state."""
+        return self._constant(self.V_E_0)
 
     @property
     def E_fd(self) -> Expr:
         """Field voltage of the machine [pu]."""
         return self.V_E * rectifier(self.p.K_C * self.seen.I_fd / fmax(self.V_E, _LEAST))
+
+    def _constant(self, V_E: Expr) -> Expr:
+        return fmax(self.p.K_E + self.curve.part(V_E) / fmax(V_E, _LEAST), _LEAST)
 
     def drive(self, V_R: Expr, low: Scalar = 0.0, high: Scalar = _MOST) -> None:
         """Close V_E, driven by V_R, within its limits."""
