@@ -28,6 +28,7 @@ from fmus.synchronous_generator.excitation.without_regulator import external, ma
 from fmus.synchronous_generator.limiters.common import Limiter, Limiters
 from fmus.synchronous_generator.limiters.oel2c import oel2c
 from fmus.synchronous_generator.limiters.oel3c import oel3c
+from fmus.synchronous_generator.limiters.oel4c import oel4c
 from fmus.synchronous_generator.limiters.overexcitation import maxex1, maxex2
 from fmus.synchronous_generator.limiters.uel2c import uel2, uel2c
 from fmus.synchronous_generator.limiters.underexcitation import mnlex2, uel1
@@ -159,6 +160,7 @@ OELS: dict[str, Limiter | None] = {
     "maxex2": maxex2,
     "oel2c": oel2c,
     "oel3c": oel3c,
+    "oel4c": oel4c,
 }
 UELS: dict[str, Limiter | None] = {
     NONE: None,

@@ -159,6 +159,7 @@ def test_every_field_of_a_dyr_record_sets_a_parameter_of_its_part(name):
         ("OEL2C", 43),
         ("OEL2CU1", 49),
         ("OEL3C", 12),
+        ("OEL4C", 5),
         ("UEL2", 41),
         ("UEL2C", 51),
         ("UEL2CU1", 57),

@@ -42,6 +42,14 @@ def rate_within_limits(x: Expr, rate: Scalar, low: Scalar, high: Scalar) -> Expr
     return fmin(fmax(rate, (low - x) / RETURN_TIME), (high - x) / RETURN_TIME)
 
 
+def time_that_lasts(m: ModelBuilder, name: str, holds: Expr, enough: Scalar) -> Expr:
+    """Declare the time [s] for which a condition has held without a break; counted to a second more than is enough."""
+    time = m.state(name, 0.0, "s", "Time that has been counted")
+    runs = fmin(1, (enough + 1 - time) / RETURN_TIME)
+    m.derivative(time, if_else(holds, runs, -time / RETURN_TIME))
+    return time
+
+
 @dataclass(frozen=True)
 class Floors:
     """Lower limits behind the integral of a limiter that has no other way, K_UL = 0, and rests at its own limit.

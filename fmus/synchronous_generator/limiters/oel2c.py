@@ -29,6 +29,7 @@ from fmus.synchronous_generator.limiters.common import (
     limit_that_rests,
     rate_within_limits,
     sensed_field,
+    time_that_lasts,
 )
 from fmus.toolchain.blocks import (
     BYPASS_TIME,
@@ -200,20 +201,12 @@ def _bias(m: ModelBuilder, p: Given, rest: _Rest, now: tuple[Expr, Expr, Expr]) 
     at_top = reference >= rest.instantaneous - _REACHED
     below = logic_and(at_top, reference - act > p.I_THoff)
     releases = logic_and(logic_and(is_set, below), logic_and(p.T_en > 0, left > _REACHED))
-    over_for = _clock(m, "over_for", over, p.T_en)
-    below_for = _clock(m, "below_for", releases, p.T_off)
+    over_for = time_that_lasts(m, "over_for", over, p.T_en)
+    below_for = time_that_lasts(m, "below_for", releases, p.T_off)
     sets = logic_or(logic_or(late, p.T_en <= 0), logic_and(over, over_for >= p.T_en))
     holds = logic_and(is_set, 1 - logic_and(releases, below_for >= p.T_off))
     m.derivative(latch, (if_else(logic_or(sets, holds), 1, 0) - latch) / RETURN_TIME)
     return if_else(is_set, 0, p.I_reset)
-
-
-def _clock(m: ModelBuilder, name: str, counts: Expr, enough: Expr) -> Expr:
-    """Declare the time [s] that something has lasted; it is counted to a second more than is enough."""
-    time = m.state(name, 0.0, "s", "Time that has been counted")
-    runs = fmin(1, (enough + 1 - time) / RETURN_TIME)
-    m.derivative(time, if_else(counts, runs, -time / RETURN_TIME))
-    return time
 
 
 def _signal(m: ModelBuilder, p: Given, e: Expr, e_0: Expr) -> tuple[Expr, Expr]:

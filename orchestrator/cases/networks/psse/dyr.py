@@ -19,7 +19,7 @@ from orchestrator.cases.networks.psse.dyr_mistakes import (
 from orchestrator.cases.networks.psse.dyr_questions import doubts_of_machine
 from orchestrator.cases.networks.psse.dyr_unit_records import RECORDS_OF_UNITS
 from orchestrator.cases.networks.psse.following_converters import models_of_following
-from orchestrator.cases.networks.psse.limiter_records import place_limiters
+from orchestrator.cases.networks.psse.limiter_records import give_reactive_limits, place_limiters
 from orchestrator.cases.networks.psse.machine_model import (
     BY_SPEED,
     CLASSICAL,
@@ -68,6 +68,7 @@ def machine_models(
     for record in records:
         found.take(record)
     place_limiters([] if found.problems else records, left, found.parts, found.values)
+    give_reactive_limits(found.machines, found.values)
     found.give_load_controllers()
     found.give_infinite_machines()
     static = _static_machines(found, replaced) if WITHOUT_RECORD in leaving_out else {}

@@ -30,9 +30,7 @@ from orchestrator.cases.networks.psse.relay_records import OF_BUSES
 
 _LIBRARY = "PSS/E's model library as PowerWorld's and NEPLAN's guides and ANDES' reader describe it"
 _COMPENSATORS = "PowerWorld's guide to PSS/E's models; CSVGN5 and SVSMO1 as InterPSS reads them"
-_OF_LIMITERS = (
-    "IEC 61970-302, STEPSS' page of RAMSES' exciters, Dynawo, OpenIPSL; PowerWorld's help (OEL3C)"
-)
+_OF_LIMITERS = "IEC 61970-302, STEPSS' page of RAMSES' exciters, Dynawo, OpenIPSL; PowerWorld's help (OEL3C, OEL4C)"
 _SOURCES = {
     "supervisor": "STEPS' reader and model of LCFB1, IEC 61970-302, PowerWorld's help on LCFB1_PTI"
 }

@@ -9,6 +9,7 @@ from orchestrator.cases.networks.psse.dyr_counts import doubt_of_count
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, given_values
 from orchestrator.cases.networks.psse.dyr_unit_records import RECORDS_OF_UNITS
 from orchestrator.cases.networks.psse.dyr_values import CEILING, FLOOR, chosen_ceiling
+from orchestrator.cases.networks.psse.limiter_records import REACTIVE_LIMIT
 from orchestrator.cases.networks.psse.raw_network import Machine
 from orchestrator.cases.networks.unit_row import DoubtOfRecord
 
@@ -27,6 +28,8 @@ _VOLTAGE_OF_OEL3C = 1  # the input that is the field voltage
 _LEAST_EXPONENT = (
     1  # of the inverse time of OEL3C, from which one is plausible: 1 in IEEE 421.5-2016
 )
+
+_MOST_REACTIVE = 3  # reactive power of a machine [pu], far above what one gives for long
 
 _LIMITS_OF_COMPENSATORS = (
     ("Vrefmin", "Vrefmax", "the slow control cannot move the reference as it is meant"),
@@ -51,6 +54,7 @@ def doubts_of_machine(
     yield from _inverse_times(records, values)
     yield from _of_oel2c(records, values)
     yield from _of_oel3c(records, values)
+    yield from _of_oel4c(records, values)
     yield from _turned_limits(records, values)
     x_d2, x_source = values.get("machine.X_d2"), machine.source.imag
     if x_d2 is None or abs(x_source - x_d2) <= _SAME * abs(x_d2):
@@ -194,6 +198,30 @@ def _of_oel3c(
         )
         yield DoubtOfRecord("oel.K_1", record.place, text, f"an exponent of {record.name} below 1")
     yield from _rests_above(record, values, "VOELMAX1 and VOELMAX2")
+
+
+def _of_oel4c(
+    records: Sequence[DynamicRecord], values: Mapping[str, float]
+) -> Iterator[DoubtOfRecord]:
+    """Ask about an OEL4C whose limit is 0, or so high that it may be in Mvar."""
+    record = next((one for one in records if REACTIVE_LIMIT in _sets(one.name)), None)
+    if record is None or REACTIVE_LIMIT not in values:
+        return
+    given = given_values(record, RECORDS_OF_UNITS[record.name].fields, {*RECORDS_OF_UNITS, *FIELDS})
+    if given["QREF"] == 0:
+        text = (
+            f"{record.name} has QREF = 0, for which PowerWorld takes the greatest reactive power of the power flow: QT "
+            f"of the RAW file, {values[REACTIVE_LIMIT]:.4g} pu of MBASE, is taken; what PSS/E does no public source "
+            "tells; give QREF"
+        )
+        yield DoubtOfRecord(REACTIVE_LIMIT, record.place, text, f"a limit of {record.name} of 0")
+    elif given["QREF"] > _MOST_REACTIVE:
+        text = (
+            f"{record.name} has QREF = {given['QREF']:g}, which is per unit of MBASE, and no machine gives as much: it "
+            "never limits; divide it by MBASE if it is in Mvar"
+        )
+        kind = f"a limit of {record.name} that nothing reaches"
+        yield DoubtOfRecord(REACTIVE_LIMIT, record.place, text, kind)
 
 
 def _rests_above(

@@ -4,9 +4,12 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from fmus.synchronous_generator.dyr_records import DYR_RECORDS
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, given_values
+from orchestrator.cases.networks.psse.raw_network import Machine
 
 LIMITERS = ("oel", "uel")
 """Kinds of records that are limiters, of over- and of underexcitation."""
+
+REACTIVE_LIMIT = "oel.Q_ref"  # of OEL4C [pu of MBASE]
 
 UNHEARD = "a limiter of excitation whose signal its exciter does not take where gfor's limiters act"
 
@@ -36,6 +39,16 @@ def place_limiters(
         elif place is None and parts[key].pop(kind, None) is not None:
             for name in [name for name in values[key] if name.startswith(f"{kind}.")]:
                 del values[key][name]
+
+
+def give_reactive_limits(
+    machines: Mapping[tuple[int, str], Machine],
+    values: Mapping[tuple[int, str], dict[str, float]],
+) -> None:
+    """Set the limit of an OEL4C that is 0 to the machine's greatest reactive power, QT, as PowerWorld has it."""
+    for key, own in values.items():
+        if own.get(REACTIVE_LIMIT) == 0:
+            own[REACTIVE_LIMIT] = machines[key].q_max_mvar / machines[key].rating_mva
 
 
 def _places(
