@@ -8,7 +8,7 @@ from typing import Any
 from fmus.synchronous_generator.excitation.alternator import ac8b, esac6a, exac2, exbas
 from fmus.synchronous_generator.excitation.bridge import st5b, st6b, st7b, st8c
 from fmus.synchronous_generator.excitation.common import Exciter
-from fmus.synchronous_generator.excitation.compound import esst2a, esst3a, ieeet3
+from fmus.synchronous_generator.excitation.compound import esst2a, esst3a, exst3, ieeet3
 from fmus.synchronous_generator.excitation.integral import ac7b, dc4b, expic1
 from fmus.synchronous_generator.excitation.nve import exni
 from fmus.synchronous_generator.excitation.rexsys import rexsys
@@ -109,6 +109,7 @@ EXCITERS: dict[str, Exciter] = {
     "st1a": st1a,
     "esst2a": esst2a,
     "esst3a": esst3a,
+    "exst3": exst3,
     "st4b": st4b,
     "st5b": st5b,
     "st6b": st6b,

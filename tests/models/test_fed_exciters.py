@@ -270,3 +270,39 @@ def test_the_field_voltage_stops_at_its_limit_and_leaves_it_at_once(case, side):
     assert side * max(side * np.array(voltages)) == pytest.approx(limit, rel=1e-3, abs=2e-3)
     back, _ = integrated(alone, lambda t: [V_T, E_FD, -0.3 * side], 1.0, x=x)
     assert side * (limit - back[-1]["E_fd"]) > 0.2
+
+
+OLD = {"K_P": 6.0, "K_I": 0.3, "X_L": 0.05, "theta_P": 12.0, "K_C": 0.3, "K_G": 0.4, "V_GMAX": 1.5}
+OLD |= {"V_IMAX": 0.25, "V_IMIN": -0.15, "T_C": 0.4, "T_B": 3.0, "T_R": 0.02}
+EXST3 = OLD | {"K_J": 90.0, "K_A": 8.0, "T_A": 0.3, "V_RMAX": 0.9, "V_RMIN": -0.1, "E_FDMAX": 99.0}
+ITS_ESST3A = OLD | {"K_A": 90.0, "T_A": 0.0, "K_M": 8.0, "T_M": 0.3, "V_MMAX": 0.9, "V_MMIN": -0.1}
+ITS_ESST3A |= {"V_RMAX": 99.0, "V_RMIN": -99.0, "V_BMAX": 99.0}
+"""EXST3, and the ESST3A that it is without its limit of the field voltage."""
+
+
+def dipping(t):
+    """A dip of the voltage, and signals that drive both limits of the regulator."""
+    v_s = 0.3 if t < 0.4 else -0.4
+    return [0.8 if t < 0.1 else REST[0], REST[1] + 0.3, v_s]
+
+
+def test_exst3_is_esst3a_with_one_amplifier():
+    old, new = exciter("exst3", EXST3), exciter("esst3a", ITS_ESST3A)
+    assert not refused(old)
+    assert max(map(abs, old.rates(REST).values())) < 1e-9
+    for hertz in (0.05, 0.7, 7.0):
+        found, wanted = (x.response(2j * np.pi * hertz, REST) for x in (old, new))
+        for u in ("v_t", "v_s", "I_fd"):
+            assert found["E_fd", u] == pytest.approx(wanted["E_fd", u], rel=1e-6)
+    found, wanted = (integrated(x, dipping, 0.8, 2e-3)[0] for x in (old, new))
+    both = [[each["E_fd"] for each in one] for one in (found, wanted)]
+    assert np.ptp(both[1]) > 3.0
+    assert np.abs(np.subtract(*both)).max() < 1e-6
+
+
+def test_exst3_limits_its_field_voltage_and_starts_below_that():
+    old = exciter("exst3", EXST3 | {"E_FDMAX": 3.0})
+    found, _ = integrated(old, dipping, 0.4, 2e-3)
+    assert max(each["E_fd"] for each in found) == pytest.approx(3.0, abs=1e-12)
+    (said,) = refused(exciter("exst3", EXST3 | {"E_FDMAX": REST[1]}))
+    assert said == "exciter.E_FDMAX must exceed the field voltage at the start"

@@ -115,6 +115,7 @@ def test_every_field_of_a_dyr_record_sets_a_parameter_of_its_part(name):
         ("SCRX", 8),
         ("BBSEX1", 11),
         ("EXNI", 10),
+        ("EXST3", 18),
         ("REXSYS", 31),
         ("REXSY1", 33),
         ("EXPIC1", 24),

@@ -1,4 +1,4 @@
-"""ESST2A, ESST3A and IEEET3: exciters fed by the terminal's voltage and, compounded, by the stator's current.
+"""ESST2A, ESST3A, EXST3 and IEEET3: exciters fed by the terminal's voltage and, compounded, by the stator's current.
 
 ESST2A has an exciter of first order between the regulator and the field:
 
@@ -10,6 +10,11 @@ ESST3A has an inner regulator of the field voltage:
     V_IMIN ≤ V_ref + V_S − v_m ≤ V_IMAX → (1+sT_C)/(1+sT_B) → K_A/(1+sT_A) = V_R, held within V_RMIN and V_RMAX
     → − min(K_G·E_fd, V_GMAX) → K_M/(1+sT_M) = V_M, held within V_MMIN and V_MMAX,  E_fd = V_M·V_B
 
+EXST3, of 1979, has one amplifier, behind the lead and lag, and a limit of the field voltage:
+
+    V_IMIN ≤ V_ref + V_S − v_m ≤ V_IMAX → K_J·(1+sT_C)/(1+sT_B) → − min(K_G·E_fd, V_GMAX)
+    → K_A/(1+sT_A) = V_R, held within V_RMIN and V_RMAX,  E_fd = V_R·V_B ≤ E_FDMAX
+
 IEEET3 adds the regulator's voltage to that of the source, behind a commutating reactance:
 
     V_ref + V_S − v_m − V_F → K_A/(1+sT_A) = V_R, held within V_RMIN and V_RMAX
@@ -17,7 +22,7 @@ IEEET3 adds the regulator's voltage to that of the source, behind a commutating 
     T_E·dE_fd/dt = V_B − K_E·E_fd,  V_F = s·K_F/(1+sT_F)·E_fd
 
 V_E and V_B are those of `sources`. Sources: OpenIPSL at 2be0558a (ESST2A), ANDES 2.0.0 (ESST3A, IEEET3), Opal-RT's
-library of phasor models at 6dc8ca5 (ESST3A, IEEET3), IEEE 421.5."""
+library of phasor models at 6dc8ca5 (ESST3A, IEEET3) and cba975b8 (EXST3), IEEE 421.5."""
 
 from fmus.synchronous_generator.data_lines import Given, declared, pu, seconds
 from fmus.synchronous_generator.excitation.common import (
@@ -29,13 +34,19 @@ from fmus.synchronous_generator.excitation.common import (
     rate_feedback,
     require_within,
 )
-from fmus.synchronous_generator.excitation.sources import COMPOUND, Source, compound_source
+from fmus.synchronous_generator.excitation.sources import (
+    COMPOUND,
+    LOADED,
+    Source,
+    compound_source,
+)
 from fmus.toolchain.blocks import (
     clamp,
     close_limited_low_pass,
     held_at_limits,
     limited_low_pass,
 )
+from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, fmax, fmin, if_else, sqrt
 
@@ -50,6 +61,18 @@ REGULATOR = (
 EXCITER = (
     pu("K_E", 1.0, "Exciter constant", 1e-3),
     seconds("T_E", 0.5, "Exciter's field", 1e-3),
+)
+EXST3 = (
+    pu("V_IMAX", 0.2, "Upper limit of the error"),
+    pu("V_IMIN", -0.2, "Lower limit of the error"),
+    pu("K_J", 200.0, "Gain of the first stage", 1e-3),
+    pu("K_A", 7.93, "Gain", 1e-3),
+    seconds("T_A", 0.4, "Amplifier", 1e-3),
+    pu("V_RMAX", 1.0, "Upper limit of V_R"),
+    pu("V_RMIN", 0.0, "Lower limit of V_R"),
+    pu("K_G", 1.0, "Feedback of the field voltage", 0),
+    pu("V_GMAX", 5.8, "Upper limit of that feedback"),
+    pu("E_FDMAX", 6.9, "Upper limit of the field voltage"),
 )
 ESST3A = (
     pu("V_IMAX", 0.2, "Upper limit of the error"),
@@ -112,6 +135,33 @@ def esst3a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         E_fd = V_M * source.available(seen.terminal(first))
         rest = V_R - fmin(inner.K_G * E_fd, inner.V_GMAX)
         close_limited_low_pass(m, x, inner.K_M * rest, inner.T_M, inner.V_MMIN, inner.V_MMAX)
+        return measured.close(E_fd)
+
+
+def exst3(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
+    with m.scope("exciter"):
+        p, E_0 = declared(m, EXST3, SOURCE), seen.start.E_fd
+        fed = declared(m, (*COMPOUND, LOADED[0]), SOURCE, {"K_P": 6.15, "K_C": 0.2})
+        source = Source(fed, seen)
+        V_R0 = E_0 / source.at_start
+        V_I0 = (V_R0 / p.K_A + fmin(p.K_G * E_0, p.V_GMAX)) / p.K_J
+        require_within(m, V_I0, p.V_IMIN, p.V_IMAX, ("exciter.V_IMIN", "exciter.V_IMAX"))
+        require_within(m, V_R0, p.V_RMIN, p.V_RMAX, ("exciter.V_RMIN", "exciter.V_RMAX"))
+        m.require(p.E_FDMAX - E_0, "exciter.E_FDMAX must exceed the field voltage at the start")
+        measured = Measurement(m, seen)
+        error = clamp(measured.error(V_I0), p.V_IMIN, p.V_IMAX)
+        V_A = p.K_J * lead_lag_stage(m, error, V_I0, lead=1.0)
+        x = m.state("amplifier", V_R0, "pu", "first-order lag with limits", base="E_fd")
+        V_R = clamp(x, p.V_RMIN, p.V_RMAX)
+
+        def driven(v_t: Phasor) -> Expr:
+            return fmin(V_R * source.available(v_t), p.E_FDMAX)
+
+        # v_t depends on E_fd, and E_fd on v_t, weakly: two rounds from I_fd, the value of E_fd at rest
+        E_fd = driven(seen.terminal(driven(seen.terminal(seen.I_fd))))
+        rest = V_A - fmin(p.K_G * E_fd, p.V_GMAX)
+        close_limited_low_pass(m, x, p.K_A * rest, p.T_A, p.V_RMIN, p.V_RMAX)
         return measured.close(E_fd)
 
 
