@@ -78,6 +78,20 @@ def with_events(case: Case, forcings: Sequence[str], faults: Sequence[str]) -> C
     return replace(case, table=table, events_given=tuple(said))
 
 
+def different_scenarios(case: Case) -> list[str]:
+    """Return the scenarios that are left to compute: of those that only their own events told apart, the first.
+
+    Without events in the place of the case's, all of them."""
+    if not case.events_given:
+        return [*case.table.scenarios]
+    found: list[tuple[str, ScenarioTable]] = []
+    for name, table in case.table.scenarios.items():
+        alike = table.model_copy(update={"title": ""})
+        if all(alike != other for _, other in found):
+            found.append((name, alike))
+    return [name for name, _ in found]
+
+
 def _title(scenario: ScenarioTable, said: Sequence[str]) -> str:
     """The title of a scenario with other events: these, where its own title told of events of its own."""
     return ", ".join(said) if scenario.events and scenario.title else scenario.title

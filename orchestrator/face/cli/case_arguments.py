@@ -6,7 +6,7 @@ from typing import Any
 
 from orchestrator.cases.case import Case, load_case, with_protection
 from orchestrator.cases.flow.sharing import SharingRule
-from orchestrator.cases.forcing import with_events
+from orchestrator.cases.forcing import different_scenarios, with_events
 from orchestrator.cases.form.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.form.schema import Value
 from orchestrator.cases.scenario.prepare import PreparedScenario
@@ -68,7 +68,7 @@ def chosen(options: argparse.Namespace) -> list[Scenario]:
         "parameters": parameters(options),
     }
     request = ScenariosRequest(**asked)
-    scenarios = choose(file, options.scenario, request, stop)
+    scenarios = choose(file, options.scenario or different_scenarios(file), request, stop)
     print_questions(
         [scenario.prepared for scenario in scenarios],
         as_json=getattr(options, "json", True),

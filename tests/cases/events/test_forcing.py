@@ -8,7 +8,7 @@ import pytest
 
 import orchestrator as gfor
 from orchestrator.cases.case import load_case
-from orchestrator.cases.forcing import event_of, with_events
+from orchestrator.cases.forcing import different_scenarios, event_of, with_events
 from orchestrator.core.errors import CaseError, InputError
 from orchestrator.core.options import Option
 from orchestrator.systems.coupling.events import Forcing
@@ -31,6 +31,16 @@ def test_a_fault_of_the_command_takes_the_title_of_the_one_that_it_replaces():
     found = with_events(told, (), ["bus_9, 150 ms"]).table.scenarios
     assert found["base"].title == own["base"].title
     assert found["fault"].title == 'fault "bus_9, 150 ms"'
+
+
+def test_of_scenarios_that_their_events_told_apart_the_first_is_computed():
+    case = load_case("wscc9")
+    base, other = (case.table.scenarios[name] for name in ("base", "gfor"))
+    with_fault = base.model_copy(update={"title": "Fault", "events": case.table.events})
+    scenarios = {"base": base, "fault": with_fault, "gfor": other}
+    own = replace(case, table=case.table.model_copy(update={"scenarios": scenarios}))
+    assert different_scenarios(own) == ["base", "fault", "gfor"]
+    assert different_scenarios(with_events(own, (), ["bus_9, 150 ms"])) == ["base", "gfor"]
 
 
 def test_a_sine_is_followed_to_its_two_hundredth():
