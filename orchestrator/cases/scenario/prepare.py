@@ -314,9 +314,9 @@ class Preparer:
         check_plausibility(draft)
         flow = None if draft.found.problems else power_flow_of(draft)
         question_loading(draft, flow)
-        check_motor_relays(draft, flow)
         draft.found.questions += widened_questions(draft)
         clock = clock_of(draft, step_size)
+        check_motor_relays(draft, flow, clock.step_size if clock else None)
         told: frozenset[str] = frozenset()
         if clock is not None:
             second_order = draft.given.case.solver.schedule in SECOND_ORDER

@@ -1,7 +1,8 @@
-"""Warnings of motors beside which a susceptance feeds more than they draw, so that the load is hardly a motor."""
+"""Warnings of motors that trip after the start, and of those that are hardly motors beside their susceptance."""
 
 from collections.abc import Iterator
 
+from orchestrator.linear.models.waiting_relays import waiting_relays
 from orchestrator.systems.coupling.master import Master
 
 _BESIDE = "B_shunt"  # susceptance beside an induction machine [pu, S_n]; above 0 capacitive
@@ -10,8 +11,16 @@ _GIVEN = ("P_0", "Q_0", "S_n", "v_0")
 
 
 def motor_warnings(master: Master) -> tuple[str, ...]:
-    """Warn of motors with more Mvar beside them than MW that they draw; for a master at its start."""
-    return tuple(text for name in master.components for text in _of_machine(master, name))
+    """Warn of motors with more Mvar beside them than MW that they draw, and of those about to trip; at the start."""
+    beside = (text for name in master.components for text in _of_machine(master, name))
+    return (*beside, *(_about_to_trip(*one) for one in waiting_relays(master)))
+
+
+def _about_to_trip(name: str, voltage: float, limit: float, after: float) -> str:
+    return (
+        f"{name} is about to trip: its undervoltage relay counts below VI = {limit:g} pu, and the voltage rests at "
+        f"{voltage:.4g} pu; a run trips it {after:.3g} s after its start, and the modes are those before that"
+    )
 
 
 def _of_machine(master: Master, name: str) -> Iterator[str]:

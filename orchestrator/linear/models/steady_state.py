@@ -23,6 +23,7 @@ from orchestrator.linear.models.linear_model import HELD
 from orchestrator.linear.models.linearization import Blocks, compose
 from orchestrator.linear.models.periodic import find_periodic_point
 from orchestrator.linear.models.sampled import steps_of_period
+from orchestrator.linear.models.waiting_relays import hold_waiting_relays
 from orchestrator.systems.coupling.imperfections import described
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.schedule import gauss_seidel
@@ -55,6 +56,7 @@ def find_operating_point(
     over a shorter step.
     ``accept``: below this change, the power flow's point is taken as it is. Between ``accept`` and ``tolerance`` a
     better point is searched for, and kept if it is better."""
+    waiting = hold_waiting_relays(master)
     steps = steps_of_period(master, master.clock.step_size)
     if steps > 1:
         return _periodic_point(master, steps, tolerance, accept, max_iterations)
@@ -62,7 +64,7 @@ def find_operating_point(
     tolerance *= min(1.0, master.clock.step_size / _SHORT)
     start = CoupledState(master).read()
     found = _search(master, accept, max_iterations)
-    held = examine_held(master, held_names(master))
+    held = examine_held(master, [name for name in held_names(master) if name not in waiting])
     if not found.residual <= tolerance:
         found, held = _beside_stores(master, start, found, tolerance, accept, max_iterations)
     values = dict(zip(found.names, found.x.tolist(), strict=True))

@@ -1,5 +1,7 @@
 """Loads that are motors by their records: which ones, at what rating, what stays a load, and the modes of a case."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import linear_sum_assignment
@@ -16,6 +18,7 @@ from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.cases.scenario.facts import facts_of
 from orchestrator.core.errors import InputError
 from orchestrator.studies.modes.modes import compute_modes
+from orchestrator.studies.runs.run import run_scenario
 from tests.models.test_induction_machine import behind_line
 from tests.support.evaluated import Evaluated
 from tests.support.scenarios import prepare_one
@@ -236,21 +239,45 @@ def test_a_motor_beyond_its_pull_out_point_is_refused_with_its_name(case):
         compute_modes(prepared)
 
 
-def test_a_motor_whose_relay_trips_at_rest_is_refused_with_both_voltages(case):
-    """Its bus rests at the larger root of |V|⁴ + (2 (RP + XQ) − 1) |V|² + |Z|² |S|²."""
+def resting_voltage():
+    """The larger root of |V|⁴ + (2 (RP + XQ) − 1) |V|² + |Z|² |S|²: of the motor's bus."""
     S = 0.8 + 0.35j
     half = 0.5 - (LINE.conjugate() * S).real
-    v = np.sqrt(half + np.sqrt(half**2 - abs(LINE * S) ** 2))
-    tripping, resting = (
-        f"2 'CIM5BL' 1 {cim5().replace('0.7 0 0 0', f'0.7 {VI:.4f} 6 3')} /\n"
-        for VI in (v + 0.01, v - 0.01)
-    )
+    return np.sqrt(half + np.sqrt(half**2 - abs(LINE * S) ** 2))
+
+
+def with_relay(VI, TI=6):
+    return f"2 'CIM5BL' 1 {cim5().replace('0.7 0 0 0', f'0.7 {VI:.4f} {TI} 3')} /\n"
+
+
+def test_a_motor_whose_relay_trips_at_once_is_refused_with_both_voltages(case):
+    v = resting_voltage()
     with pytest.raises(InputError, match="the undervoltage relay of motor2") as refused:
-        case(tripping)
-    told = f"rests at {v:.4g} pu, below VI = {v + 0.01:.4f} pu, so that it trips 0.15 s after the"
+        case(with_relay(v + 0.01, TI=0))
+    told = f"rests at {v:.4g} pu, below VI = {v + 0.01:.4f} pu, so that it trips 0.05 s after the"
     assert told in str(refused.value)
     assert "mill.dyr, line 2" in str(refused.value)
-    assert prepare_one(case(resting), "base").system.components["motor2"].number("TI") == 6
+
+
+def test_a_motor_about_to_trip_is_told_starts_and_trips_in_the_run(case):
+    """Until its relay has counted for 6 + 3 cycles of 60 Hz the motor draws 80 MW, and its modes are as without it."""
+    v = resting_voltage()
+    path = case(with_relay(v + 0.01))
+    prepared = replace(prepare_one(path, "base"), stop_time=0.3, events=())
+    (asked,) = (q.text for q in prepared.questions if "undervoltage relay" in q.text)
+    assert f"below VI = {v + 0.01:.4f} pu, so that it trips 0.15 s after the start" in asked
+    found = run_scenario(prepared)
+    (said,) = (text for text in found.modes.warnings if "about to trip" in text)
+    assert f"rests at {v:.4g} pu; a run trips it 0.15 s after its start" in said
+    voltage, times = found.dataset["grid.bus_2.v"].values, found.dataset["time"].values
+    assert voltage[times < 0.149] == pytest.approx(v, abs=1e-6)
+    assert times[np.argmax(voltage > v + 0.02)] == pytest.approx(0.15, abs=0.012)
+    without = compute_modes(prepare_one(case(with_relay(v - 0.01)), "base"))
+    states = [k for k, name in enumerate(without.model.names) if ".relay." not in name]
+    assert len(states) == len(without.model.names) - 3
+    theirs = np.array(without.eigenvalues)
+    for value in found.modes.eigenvalues:
+        assert np.abs(theirs - value).min() < 1e-6 * (1 + abs(value))
 
 
 def test_a_record_of_a_load_is_no_record_of_the_machine_at_its_bus(case):
