@@ -156,7 +156,7 @@ class Stability(NoTruth):
     common_speed
         The machines' speeds where what grows fastest is the drift of all of them alike; none otherwise.
     of_zeros
-        States that take part most in several zeros, in a system too large for all its eigenvalues.
+        States that take part most where several eigenvalues are zero; none where no component gives derivatives.
 
     Examples
     --------
@@ -180,7 +180,7 @@ class Stability(NoTruth):
     step_size: float | None = None  # communication step [s]; None for a continuous model
     reason: str = ""  # why the verdict is not known, or the region that was not searched
     common_speed: tuple[str, ...] = ()  # the machines' speeds where they drift alike
-    of_zeros: tuple[str, ...] = ()  # states that take part most in several zeros of a large system
+    of_zeros: tuple[str, ...] = ()  # states that take part most in several zeros
 
     @property
     def only_common_speed(self) -> bool:
@@ -283,8 +283,8 @@ def zeros_in_words(zeros: int, states: Sequence[str] = ()) -> str:
     if not states:
         return text
     return (
-        f"{text}, which lie in {few(states, _STATES_NAMED)}; what each of the regulators that hold one voltage "
-        "without droop feeds is undefined: give them a compensation of their currents, or a droop"
+        f"{text}, which lie in {few(states, _STATES_NAMED)}; where these are of regulators that hold one voltage "
+        "without droop, what each of them feeds is undefined: give them a compensation of their currents, or a droop"
     )
 
 
@@ -363,12 +363,15 @@ def judge(
         return replace(own, cause=Cause.UNKNOWN) if own.stable is False else own
     if isinstance(of_system, Decay):
         if own.stable:
-            return replace(own, continuous_growth_rate=of_system.rate)
+            return replace(
+                own, continuous_growth_rate=of_system.rate, of_zeros=_where_zero(system, own.zeros)
+            )
         of_system = None  # what grows is told beside the mode of the system, which is to be found
     continuous = _look_at(system, of_system or whole_spectrum(system))
     rate = continuous.largest_growth_rate
     if spectrum is None:  # its zeros are looked for in the continuous model alone
-        own = replace(own, zeros=continuous.zeros, of_zeros=continuous.of_zeros)
+        own = replace(own, zeros=continuous.zeros)
+    own = replace(own, of_zeros=continuous.of_zeros if own.zeros > 1 else ())
     if own.stable is False and continuous.stable is not None and _only_slow(spectrum, own):
         slow = f"slow eigenvalues, up to {SLOW:g} rad/s, are those without a communication step"
         return replace(
@@ -386,6 +389,11 @@ def judge(
             reason="; ".join(t for t in (own.reason, text) if t),
         )
     return replace(own, continuous_growth_rate=rate)
+
+
+def _where_zero(model: LinearModel, zeros: int) -> tuple[str, ...]:
+    """Return the states that take part most where several eigenvalues of a continuous model are zero."""
+    return zero_space(model).states if zeros > 1 and model.step_size is None else ()
 
 
 def _only_slow(spectrum: Spectrum | None, own: Stability) -> bool:
@@ -430,6 +438,7 @@ def _look_at(model: LinearModel, spectrum: Spectrum | None) -> Stability:
         spectrum.rightmost,
         growing=growing,
         zeros=zeros,
+        of_zeros=_where_zero(model, zeros),
         eigenvalues=len(spectrum.eigenvalues),
         cause=cause,
         continuous_growth_rate=None,

@@ -1,4 +1,4 @@
-"""Eigenvalues that are zero in a system too large for its full spectrum, and the states in which they lie.
+"""Eigenvalues that are zero, and the states in which they lie, from the sparse equations of a system of any size.
 
 A zero that many have is found by no search with a few vectors. Beside 0 the zeros are by far the largest eigenvalues of
 (A − σI)⁻¹: a space of as many vectors and more turns to theirs in a few solutions, from both sides. The participation

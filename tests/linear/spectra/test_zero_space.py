@@ -1,4 +1,4 @@
-"""Zeros of a system that is too large for its full spectrum, against what was planted."""
+"""Zeros of a system and the states in which they lie, against what was planted."""
 
 import numpy as np
 import pytest
@@ -33,9 +33,11 @@ def test_of_integrators_in_parallel_all_but_one_are_zeros(groups, zeros):
     assert set(found.states) == partaking
 
 
-@pytest.mark.slow
-def test_the_verdict_on_a_large_system_tells_its_zeros(monkeypatch):
-    monkeypatch.setattr(stability, "WHOLE", 20)
+@pytest.mark.parametrize(
+    "whole", [pytest.param(20, marks=pytest.mark.slow), pytest.param(stability.WHOLE)]
+)
+def test_the_verdict_on_a_system_of_any_size_tells_its_zeros(whole, monkeypatch):
+    monkeypatch.setattr(stability, "WHOLE", whole)
     verdict = judge(regulators(2, 3))
     assert verdict.stable
     assert verdict.zeros == 3
