@@ -15,7 +15,7 @@ _STATES = ("relay.counted", _LATCH, "relay.opening")
 
 
 def waiting_relays(master: Master) -> Iterator[tuple[str, float, float, float]]:
-    """Yield each motor whose relay counts at its start: name, voltage and limit [pu], and the time until it trips [s]."""
+    """Yield each motor whose relay counts at its start: name, voltage and limit [pu], time until it trips [s]."""
     for name, component in master.components.items():
         needed = (_LATCH, _LIMIT, _AT_REST, _RATED, *_CYCLES)
         if not {*needed, *_STATES} <= component.description.variables.keys():
