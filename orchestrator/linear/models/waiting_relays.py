@@ -7,7 +7,9 @@ from collections.abc import Iterator
 from orchestrator.linear.models.drifting_states import hold
 from orchestrator.systems.coupling.master import Master
 
-_LIMIT, _AT_REST, _RATED = "VI", "v_0", "f_n"  # the relay counts below VI [pu]; f_n [Hz]
+_LIMIT = "VI"  # voltage [pu] below which the relay counts
+_AT_REST = "v_0"  # voltage of the operating point [pu]
+_RATED = "f_n"  # [Hz]
 _CYCLES = ("TI", "TB")  # delay of the relay, and of its breaker [cycles of f_n]
 _LATCH = "relay.latch"
 _DECIDED = 0.5  # of the latch, above which the relay has tripped
