@@ -116,6 +116,8 @@ def test_every_field_of_a_dyr_record_sets_a_parameter_of_its_part(name):
         ("BBSEX1", 11),
         ("EXNI", 10),
         ("EXST3", 18),
+        ("ESAC2A", 22),
+        ("ESAC3A", 22),
         ("REXSYS", 31),
         ("REXSY1", 33),
         ("EXPIC1", 24),

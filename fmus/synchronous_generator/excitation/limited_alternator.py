@@ -1,0 +1,110 @@
+"""ESAC2A and ESAC3A: field-controlled alternators with a rectifier whose voltage their field's current limits.
+
+Behind the rectifier is the alternator of `alternator`; its V_E ends at (V_FEMAX − K_D·I_FD)/(K_E + S_E). ESAC2A has a
+feedback of the field's current and is EXAC2 but for that limit; a limiter of underexcitation acts before V_RMIN:
+
+    V_ref + V_S − v_m − V_F → (1+sT_C)/(1+sT_B) → K_A/(1+sT_A) = V_A, held within V_AMIN and V_AMAX
+    V_R = K_B·(V_A − K_H·V_FE), within V_RMIN and V_RMAX,  V_F = s·K_F/(1+sT_F)·V_FE,  V_E ≥ 0
+
+ESAC3A feeds its regulator itself, and its rate feedback has two gains; a limiter acts behind the lead and lag:
+
+    V_ref + V_S − v_m → (1+sT_C)/(1+sT_B) → − V_F → K_A/(1+sT_A) = V_A, held within V_AMIN and V_AMAX
+    V_R = K_R·E_fd·V_A,  V_F = s/(1+sT_F) of K_F·E_fd up to E_FDN, and of K_N·E_fd beyond,  V_E ≥ V_EMIN
+
+Sources: OpenIPSL at 2be0558a (ESAC2A), OPAL-RT's ephasorsim-modelica-library at cba975b8 (both), IEEE 421.5."""
+
+from fmus.synchronous_generator.data_lines import declared, pu, seconds
+from fmus.synchronous_generator.excitation.alternator import Alternator, alternator
+from fmus.synchronous_generator.excitation.common import (
+    BEFORE,
+    BEHIND,
+    SOURCE,
+    Measurement,
+    Regulated,
+    lead_lag_stage,
+    rate_feedback,
+    require_within,
+)
+from fmus.toolchain.blocks import clamp, limited_low_pass
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin
+
+ESAC2A = (
+    pu("K_A", 400.0, "Gain", 1e-3),
+    seconds("T_A", 0.02, "Amplifier; 0 leaves the lag out"),
+    pu("V_AMAX", 9.0, "Upper limit of V_A"),
+    pu("V_AMIN", -5.43, "Lower limit of V_A"),
+    pu("K_B", 1.0, "Gain of the second stage", 1e-3),
+    pu("V_RMAX", 9.0, "Upper limit of V_R"),
+    pu("V_RMIN", -5.43, "Lower limit of V_R"),
+    pu("V_FEMAX", 14.0, "Highest field current, as V_FE"),
+    pu("K_H", 0.0, "Feedback of the field current", 0),
+)
+ESAC3A = (
+    pu("K_A", 45.62, "Gain", 1e-3),
+    seconds("T_A", 0.013, "Amplifier; 0 leaves the lag out"),
+    pu("V_AMAX", 1.0, "Upper limit of V_A"),
+    pu("V_AMIN", -0.95, "Lower limit of V_A"),
+    pu("V_EMIN", 0.0, "Lower limit of V_E", 0),
+    pu("K_R", 3.77, "Constant of the regulator's supply", 1e-3),
+    pu("K_F", 0.143, "Rate feedback of E_fd up to E_FDN; 0 leaves it out", 0),
+    seconds("T_F", 1.0, "Lag of the rate feedback", 1e-3),
+    pu("K_N", 0.05, "Rate feedback of E_fd beyond E_FDN", 0),
+    pu("E_FDN", 2.36, "Field voltage at which the rate feedback changes"),
+    pu("V_FEMAX", 16.0, "Highest field current, as V_FE"),
+)
+
+
+def esac2a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
+    with m.scope("exciter"):
+        p, behind = declared(m, ESAC2A, SOURCE), alternator(m, seen)
+        V_R0 = behind.V_FE_0
+        V_A0 = V_R0 / p.K_B + p.K_H * V_R0
+        require_within(m, V_A0, p.V_AMIN, p.V_AMAX, ("exciter.V_AMIN", "exciter.V_AMAX"))
+        require_within(m, V_R0, p.V_RMIN, p.V_RMAX, ("exciter.V_RMIN", "exciter.V_RMAX"))
+        V_F, _ = rate_feedback(m, behind.V_FE, V_R0, 0.03, 1.0)
+        measured = Measurement(m, seen)
+        error = lead_lag_stage(m, measured.error(V_A0 / p.K_A) - V_F, V_A0 / p.K_A)
+        V_A = limited_low_pass(
+            m, "amplifier", p.K_A * error, p.T_A, p.V_AMIN, p.V_AMAX, initial=V_A0
+        )
+        driven = seen.lifted(p.K_B * (V_A - p.K_H * behind.V_FE), BEHIND, V_R0)
+        _drive(m, behind, clamp(driven, p.V_RMIN, p.V_RMAX), p.V_FEMAX)
+        return measured.close(behind.E_fd)
+
+
+def esac3a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
+    with m.scope("exciter"):
+        p, behind, E_0 = declared(m, ESAC3A, SOURCE), alternator(m, seen), seen.start.E_fd
+        V_A0 = behind.V_FE_0 / (p.K_R * E_0)
+        require_within(m, V_A0, p.V_AMIN, p.V_AMAX, ("exciter.V_AMIN", "exciter.V_AMAX"))
+
+        def weighed(E: Expr) -> Expr:
+            return p.K_F * fmin(E, p.E_FDN) + p.K_N * fmax(E - p.E_FDN, 0)
+
+        E_fd = behind.E_fd
+        x = m.state("feedback", weighed(E_0), "pu", "rate feedback, slow part", base="E_fd")
+        V_F = (weighed(E_fd) - x) / p.T_F
+        m.derivative(x, V_F)
+        measured = Measurement(m, seen)
+        error = lead_lag_stage(m, measured.error(V_A0 / p.K_A), V_A0 / p.K_A)
+        rest = seen.lifted(error, BEFORE, V_A0 / p.K_A) - V_F
+        V_A = limited_low_pass(
+            m, "amplifier", p.K_A * rest, p.T_A, p.V_AMIN, p.V_AMAX, initial=V_A0
+        )
+        _drive(m, behind, p.K_R * E_fd * V_A, p.V_FEMAX, p.V_EMIN)
+        return measured.close(E_fd)
+
+
+def _drive(
+    m: ModelBuilder, behind: Alternator, V_R: Expr, V_FEMAX: Expr, low: Scalar = 0.0
+) -> None:
+    """Close V_E, driven by V_R, from its lower limit to where the field current is the highest."""
+    m.require(
+        V_FEMAX - behind.V_FE_0,
+        "exciter.V_FEMAX must exceed the exciter's field current at the start",
+    )
+    highest = (V_FEMAX - behind.p.K_D * behind.seen.I_fd) / behind.constant
+    behind.drive(V_R, low, fmax(highest, low))
