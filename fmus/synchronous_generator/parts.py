@@ -10,7 +10,7 @@ from fmus.synchronous_generator.excitation.bridge import st5b, st6b, st7b, st8c
 from fmus.synchronous_generator.excitation.common import Exciter
 from fmus.synchronous_generator.excitation.compound import esst2a, esst3a, exst3, ieeet3
 from fmus.synchronous_generator.excitation.integral import ac7b, dc4b, expic1
-from fmus.synchronous_generator.excitation.limited_alternator import esac2a, esac3a
+from fmus.synchronous_generator.excitation.limited_alternator import esac2a, esac3a, exac3
 from fmus.synchronous_generator.excitation.nve import exni
 from fmus.synchronous_generator.excitation.rexsys import rexsys
 from fmus.synchronous_generator.excitation.rotating import (
@@ -99,6 +99,7 @@ EXCITERS: dict[str, Exciter] = {
     "exac2": exac2,
     "esac2a": esac2a,
     "esac3a": esac3a,
+    "exac3": exac3,
     "esac6a": esac6a,
     "ac8b": ac8b,
     "ac7b": ac7b,

@@ -1,4 +1,4 @@
-"""ESAC2A is EXAC2 but for a limit, ESAC3A its block diagram by hand; and the limits of both."""
+"""ESAC2A is EXAC2 but for a limit, ESAC3A and EXAC3 are their block diagrams by hand; and the limits of all."""
 
 import numpy as np
 import pytest
@@ -36,10 +36,11 @@ def test_esac2a_is_exac2_without_its_limiter():
 
 
 @pytest.mark.parametrize("hertz", HERTZ)
+@pytest.mark.parametrize("name", ["esac3a", "exac3"])
 @pytest.mark.parametrize(("E_FDN", "K"), [(3.0, 0.12), (1.5, 0.04)], ids=["below", "beyond"])
-def test_esac3a_is_its_transfer_function_at_rest(hertz, E_FDN, K):
+def test_esac3a_and_exac3_are_their_transfer_functions_at_rest(hertz, E_FDN, K, name):
     p, s = THREE | {"E_FDN": E_FDN}, 2j * np.pi * hertz
-    own = exciter("esac3a", p)
+    own = exciter(name, p)
     assert not refused(own)
     assert max(map(abs, own.rates(REST).values())) < 1e-9
     points = ((3.0, 0.05), (4.0, 0.3))
@@ -51,7 +52,8 @@ def test_esac3a_is_its_transfer_function_at_rest(hertz, E_FDN, K):
     amplifier = p["K_A"] / (1 + p["T_A"] * s)
     before = (1 + p["T_C"] * s) / (1 + p["T_B"] * s)
     back = s * K / (1 + p["T_F"] * s)
-    loop = field / gain - p["K_R"] * V_A + p["K_R"] * E_FD * amplifier * back
+    within = back if name == "esac3a" else before * back
+    loop = field / gain - p["K_R"] * V_A + p["K_R"] * E_FD * amplifier * within
     wanted = p["K_R"] * E_FD * amplifier * before / loop
     response = own.response(s, REST)
     assert response["E_fd", "v_s"] == pytest.approx(wanted, rel=1e-5)
@@ -73,6 +75,14 @@ def test_esac3a_does_not_fall_below_its_lowest_voltage():
     assert found[-1]["E_fd"] == pytest.approx(1.0, rel=1e-4)
 
 
+def test_exac3_holds_its_lowest_field_voltage():
+    """Without saturation and rectifier K_R·E_fd·K_A·K_LV·(V_LV − E_fd) = K_E·E_fd + K_D·I_FD."""
+    plain = {"S_E1": 0.0, "S_E2": 0.0, "K_C": 0.0, "K_D": 0.0, "V_LV": 1.2, "K_LV": 0.3}
+    own = exciter("exac3", THREE | plain | {"T_E": 0.1})
+    found, _ = integrated(own, lambda t: [V_T, E_FD, -0.6], 2.0, 2e-3)
+    assert found[-1]["E_fd"] == pytest.approx(1.2 - 0.9 / (3.0 * 30.0 * 0.3), rel=1e-3)
+
+
 @pytest.mark.parametrize(
     ("name", "values", "said"),
     [
@@ -80,6 +90,7 @@ def test_esac3a_does_not_fall_below_its_lowest_voltage():
         ("esac3a", {"V_FEMAX": 2.0}, "exciter.V_FEMAX must exceed"),
         ("esac3a", {"V_AMAX": 0.1}, "exciter.V_AMAX"),
         ("esac2a", {"V_RMAX": 1.0}, "exciter.V_RMAX"),
+        ("exac3", {"V_LV": 9.0, "K_LV": 1.0}, "exciter.V_LV: the operating point lies"),
     ],
 )
 def test_a_start_at_a_limit_is_refused_by_its_name(name, values, said):

@@ -118,6 +118,7 @@ def test_every_field_of_a_dyr_record_sets_a_parameter_of_its_part(name):
         ("EXST3", 18),
         ("ESAC2A", 22),
         ("ESAC3A", 22),
+        ("EXAC3", 22),
         ("REXSYS", 31),
         ("REXSY1", 33),
         ("EXPIC1", 24),

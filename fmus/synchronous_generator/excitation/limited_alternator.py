@@ -1,4 +1,4 @@
-"""ESAC2A and ESAC3A: field-controlled alternators with a rectifier whose voltage their field's current limits.
+"""ESAC2A, ESAC3A and EXAC3: field-controlled alternators with a rectifier, the first two limited by their field.
 
 Behind the rectifier is the alternator of `alternator`; its V_E ends at (V_FEMAX − K_D·I_FD)/(K_E + S_E). ESAC2A has a
 feedback of the field's current and is EXAC2 but for that limit; a limiter of underexcitation acts before V_RMIN:
@@ -11,9 +11,14 @@ ESAC3A feeds its regulator itself, and its rate feedback has two gains; a limite
     V_ref + V_S − v_m → (1+sT_C)/(1+sT_B) → − V_F → K_A/(1+sT_A) = V_A, held within V_AMIN and V_AMAX
     V_R = K_R·E_fd·V_A,  V_F = s/(1+sT_F) of K_F·E_fd up to E_FDN, and of K_N·E_fd beyond,  V_E ≥ V_EMIN
 
-Sources: OpenIPSL at 2be0558a (ESAC2A), OPAL-RT's ephasorsim-modelica-library at cba975b8 (both), IEEE 421.5."""
+EXAC3, of 1981, has its rate feedback before the lead and lag, and a limiter of low field voltages behind them instead:
 
-from fmus.synchronous_generator.data_lines import declared, pu, seconds
+    V_ref + V_S − v_m − V_F → (1+sT_C)/(1+sT_B), at least K_LV·(V_LV − E_fd) → K_A/(1+sT_A) = V_A …,  V_E ≥ 0
+
+Sources: OpenIPSL at 2be0558a (ESAC2A), OPAL-RT's ephasorsim-modelica-library at cba975b8 (all), IEEE 421.5.
+OpenIPSL's EXAC3 at c482ff5b has K_F beyond E_FDN; its own texts, OPAL-RT's library and the standard have it below."""
+
+from fmus.synchronous_generator.data_lines import Given, declared, pu, seconds
 from fmus.synchronous_generator.excitation.alternator import Alternator, alternator
 from fmus.synchronous_generator.excitation.common import (
     BEFORE,
@@ -53,6 +58,11 @@ ESAC3A = (
     pu("E_FDN", 2.36, "Field voltage at which the rate feedback changes"),
     pu("V_FEMAX", 16.0, "Highest field current, as V_FE"),
 )
+EXAC3 = (
+    pu("K_LV", 0.167, "Gain of the limiter of low field voltages", 0),
+    pu("V_LV", 0.46, "Field voltage from which downward that limiter acts"),
+    *(line for line in ESAC3A if line.name not in ("V_EMIN", "V_FEMAX")),
+)
 
 
 def esac2a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
@@ -80,14 +90,8 @@ def esac3a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         p, behind, E_0 = declared(m, ESAC3A, SOURCE), alternator(m, seen), seen.start.E_fd
         V_A0 = behind.V_FE_0 / (p.K_R * E_0)
         require_within(m, V_A0, p.V_AMIN, p.V_AMAX, ("exciter.V_AMIN", "exciter.V_AMAX"))
-
-        def weighed(E: Expr) -> Expr:
-            return p.K_F * fmin(E, p.E_FDN) + p.K_N * fmax(E - p.E_FDN, 0)
-
         E_fd = behind.E_fd
-        x = m.state("feedback", weighed(E_0), "pu", "rate feedback, slow part", base="E_fd")
-        V_F = (weighed(E_fd) - x) / p.T_F
-        m.derivative(x, V_F)
+        V_F = _rate_feedback_of_two_gains(m, p, E_fd, E_0)
         measured = Measurement(m, seen)
         error = lead_lag_stage(m, measured.error(V_A0 / p.K_A), V_A0 / p.K_A)
         rest = seen.lifted(error, BEFORE, V_A0 / p.K_A) - V_F
@@ -96,6 +100,40 @@ def esac3a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         )
         _drive(m, behind, p.K_R * E_fd * V_A, p.V_FEMAX, p.V_EMIN)
         return measured.close(E_fd)
+
+
+def exac3(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
+    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
+    with m.scope("exciter"):
+        p, behind, E_0 = declared(m, EXAC3, SOURCE), alternator(m, seen), seen.start.E_fd
+        V_A0 = behind.V_FE_0 / (p.K_R * E_0)
+        require_within(m, V_A0, p.V_AMIN, p.V_AMAX, ("exciter.V_AMIN", "exciter.V_AMAX"))
+        m.require(
+            V_A0 / p.K_A - p.K_LV * (p.V_LV - E_0),
+            "exciter.V_LV: the operating point lies where the limiter of low field voltages acts; lower it",
+        )
+        E_fd = behind.E_fd
+        V_F = _rate_feedback_of_two_gains(m, p, E_fd, E_0)
+        measured = Measurement(m, seen)
+        error = lead_lag_stage(m, measured.error(V_A0 / p.K_A) - V_F, V_A0 / p.K_A)
+        raised = fmax(error, p.K_LV * (p.V_LV - E_fd))
+        V_A = limited_low_pass(
+            m, "amplifier", p.K_A * raised, p.T_A, p.V_AMIN, p.V_AMAX, initial=V_A0
+        )
+        behind.drive(p.K_R * E_fd * V_A)
+        return measured.close(E_fd)
+
+
+def _rate_feedback_of_two_gains(m: ModelBuilder, p: Given, E_fd: Expr, E_0: Expr) -> Expr:
+    """Declare s/(1+sT_F) of the field voltage, weighed by K_F up to E_FDN and by K_N beyond."""
+
+    def weighed(E: Expr) -> Expr:
+        return p.K_F * fmin(E, p.E_FDN) + p.K_N * fmax(E - p.E_FDN, 0)
+
+    x = m.state("feedback", weighed(E_0), "pu", "rate feedback, slow part", base="E_fd")
+    V_F = (weighed(E_fd) - x) / p.T_F
+    m.derivative(x, V_F)
+    return V_F
 
 
 def _drive(
