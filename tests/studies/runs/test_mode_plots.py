@@ -8,6 +8,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from orchestrator.studies.runs import mode_plots
 from orchestrator.studies.runs.mode_plots import damping_rays, draw_eigenvalues, draw_mode_shape
 
 SHAPES = {
@@ -127,3 +128,15 @@ def test_a_mode_shape_names_the_components_of_either_side():
         0,
         0.5,
     )
+
+
+def test_bars_of_a_named_mode_have_as_much_room_beside_those_of_others(tmp_path, monkeypatch):
+    kept = []
+    monkeypatch.setattr(mode_plots, "save_figure", lambda figure, path: kept.append(figure))
+    for number in (1, 2, 3):
+        named = {str(k): SimpleNamespace(by_component={"sg1": 1.0}) for k in range(number)}
+        shown = SimpleNamespace(named=named, prepared=SimpleNamespace(title="base"))
+        assert mode_plots.plot_participation([shown], tmp_path / "participation.png")
+    one, two, three = (figure.get_figheight() for figure in kept)
+    assert three - two == pytest.approx(two - one)
+    assert two - one > 0.5 * one
