@@ -3,8 +3,7 @@
 pandapower's networks of 39 to 9241 buses with a machine and a converter at every bus with generators, as phasor models
 at 5 ms. A row for each: seconds of processor time of each part, peak memory, steps per second; then the exponents with
 which all that grows with the number of buses. Each network has a process of its own, with nothing kept from others.
-``--check`` compares the critical modes with the dense eigenvalues where there are at most `WHOLE` states. ``--count``
-counts the eigenvalues of the region by the turns of the determinant around it, in networks with a hub.
+``--check`` compares the critical modes with the dense eigenvalues where there are at most `WHOLE` states.
 ``--json`` prints three stages beside their floors, both measured in the same run (`floors`), as seconds and multiples.
 """
 
@@ -43,7 +42,6 @@ from orchestrator.linear.spectra.critical_modes import find_critical_modes
 from orchestrator.linear.spectra.modes import eigenvalues
 from orchestrator.linear.spectra.stability import WHOLE
 from orchestrator.systems.coupling.master import Master
-from tests.benchmarks.region_count import count_within
 
 CASES = ("case39", "case118", "case300", "case1354pegase", "case2869pegase", "case9241pegase")
 
@@ -118,7 +116,7 @@ def _flow(data: Any, units: list[FlowUnit]) -> PowerFlow:
     return solve_power_flow(data.buses, lines, loads, units, data.slack, shunts)
 
 
-def measure(name: str, native: str, *, check: bool, count: bool) -> dict[str, float]:
+def measure(name: str, native: str, *, check: bool) -> dict[str, float]:
     """Figures of one network, in seconds of processor time, children's included, where nothing else is said."""
     row: dict[str, float] = {}
 
@@ -168,11 +166,6 @@ def measure(name: str, native: str, *, check: bool, count: bool) -> dict[str, fl
             with timed("modes_floor"):
                 solve_around(model, shift, len(critical))
             row["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-            if count:
-                with timed("count"):
-                    row["counted"], row["points"] = count_within(
-                        model, LOWEST_HZ, HIGHEST_HZ, BELOW
-                    )
             if check and len(model.names) <= WHOLE:
                 row |= _against_dense(eigenvalues(model), critical)
             begun = time.process_time()
@@ -278,16 +271,11 @@ def main() -> None:
         help="patterns of components that are compiled without Python",
     )
     parser.add_argument(
-        "--count", action="store_true", help="count the critical modes by turns of the determinant"
-    )
-    parser.add_argument(
         "--json", action="store_true", help="print the stages beside their floors, as JSON"
     )
     given = parser.parse_args()
     if given.one:
-        print(
-            json.dumps(measure(given.cases[0], given.native, check=given.check, count=given.count))
-        )
+        print(json.dumps(measure(given.cases[0], given.native, check=given.check)))
         return
     rows = {}
     for name in given.cases:
@@ -303,11 +291,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as cache:
             environment = os.environ | {"XDG_CACHE_HOME": cache, "OPENBLAS_NUM_THREADS": "1"}
             done = subprocess.run(
-                [
-                    *command,
-                    *(["--check"] if given.check else []),
-                    *(["--count"] if given.count else []),
-                ],
+                [*command, *(["--check"] if given.check else [])],
                 env=environment,
                 stdout=subprocess.PIPE,
                 text=True,
