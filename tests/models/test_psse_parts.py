@@ -415,6 +415,13 @@ def test_ggov1_is_its_block_diagram(hertz, feedback):
     assert response["P_m", "P_e"] == pytest.approx(-droop * valve * turbine, rel=1e-6, abs=1e-12)
 
 
+def test_ggov1_without_an_integral_has_no_slow_mode_of_it():
+    """A state that nothing moves would stand in a table of modes as if the turbine were slow."""
+    without = governor("ggov1", GGOV1 | {"K_igov": 0.0})
+    poles = np.linalg.eigvals(without.blocks([1.0, P_M])[0])
+    assert max(poles.real) < -0.1
+
+
 def test_the_load_limiter_of_ggov1_holds_the_load_and_lets_go():
     """At 5 % too little speed an isochronous governor asks for all; the limiter stops at ld_ref."""
     values = {"R_select": 0, "K_pgov": 4.0, "R_open": 9.0, "R_close": -9.0, "ld_ref": 0.9}

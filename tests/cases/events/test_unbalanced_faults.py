@@ -306,6 +306,23 @@ def test_a_pole_that_opens_at_one_end_is_that_of_three_phases(bus, end, tmp_path
     assert v == pytest.approx(reference.positive()[:3], rel=1e-6)
 
 
+@pytest.mark.parametrize(("stated", "is_earthed"), [("", True), ("YNd", True), ("Dyn", False)])
+def test_a_transformer_of_a_machines_own_leads_to_earth_by_its_vector_group(
+    stated, is_earthed, tmp_path
+):
+    """Its network side is named first; without it only charging leads the zero sequence to earth."""
+    base = RING.replace("transformer.X_t = 0.0", "transformer.X_t = 0.12")
+    if stated:
+        base = base.replace("line_b0", f'step_up = "{stated}"\nline_b0')
+    fault = '[[events]]\ntype = "bus_fault"\ntime = "0.1 s"\nbus = "b1"\nkind = "1-phase"\n'
+    ready = prepared(tmp_path, fault, base)
+    (found,) = ready.faults
+    if is_earthed:
+        assert found.zero == pytest.approx(0.12j * 100 / 1000, rel=2e-3)  # charging is beside it
+    else:
+        assert found.zero.imag < -10
+
+
 def test_a_pole_that_is_left_open_at_one_end_is_said_to_leave_no_modes(tmp_path):
     prepared(tmp_path, "")
     fault = "l31 at 40 %, 50 ms, 1-phase, opens one pole at b3, recloses after 5 s, from 0.1 s"
