@@ -10,6 +10,7 @@ import pytest
 
 from orchestrator.core.errors import InputError, ResultsError
 from orchestrator.core.safe_files import write_text
+from orchestrator.output.report.html.folder import sweeps_of
 from orchestrator.output.results.manifest import (
     MANIFEST,
     ResultsWarning,
@@ -136,6 +137,14 @@ def test_a_sweep_in_the_same_folder_leaves_the_run_as_it_is(tmp_path):
         write_text(staging / "sweep.nc", "other")
     check(tmp_path)
     assert checked(tmp_path, ["sweep.nc"]).files["sweep.nc"].run == "r2"
+
+
+def test_a_report_refuses_a_sweep_that_was_changed_after_it_was_written(tmp_path):
+    with staged(tmp_path, "r1") as staging:
+        write_text(staging / "sweep.nc", "as it was")
+    write_text(tmp_path / "sweep.nc", "as it is ")
+    with pytest.raises(InputError, match=r"sweep\.nc: its content is not what run r1 wrote"):
+        sweeps_of(tmp_path)
 
 
 def test_results_of_older_versions_are_read_with_a_warning(tmp_path):
