@@ -10,6 +10,9 @@ PLANT_RECORDS = {name: record for name, record in _RECORDS.items() if record.kin
 ``plant`` sets the references, and the others are of a wind turbine; ``part`` of the plant's controller is the model
 with it."""
 
+SAME_RECORDS = {"REPCTA1": "REPCA1"}
+"""Names of records that are another by its fields and its model: PSS/E has REPCTA1 beside wind turbines of type 3."""
+
 PLANT_MODEL = "wecc_plant_phasor"
 """The model that is made of any of these records."""
 

@@ -8,6 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from fmus.toolchain.dyr_form import DyrField
+from fmus.wecc_renewable.dyr_records import SAME_RECORDS
 from orchestrator.core.errors import InputError, number_of
 from orchestrator.core.foreign_files import read_text, visible
 from orchestrator.core.units import LARGEST
@@ -126,6 +127,7 @@ def _record(file: str, line: int, tokens: Sequence[str], names: int) -> DynamicR
             f"{' '.join(tokens[:4])!r} is no record; one is bus 'MODEL' id values … /",
         )
     name, machine, values = tokens[1].upper(), tokens[2].strip(), tuple(tokens[3:])
+    name = SAME_RECORDS.get(name, name)
     if name == _OF_BUS:
         name = machine.upper()
         values = _behind_counts(values) if name in _OF_PLANTS else values

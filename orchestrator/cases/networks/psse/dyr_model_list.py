@@ -16,7 +16,12 @@ from fmus.regfm_b1.dyr_records import REGFM_B1_RECORDS
 from fmus.static_var.dyr_records import STATIC_VAR_RECORDS
 from fmus.synchronous_generator.dyr_records import DYR_RECORDS
 from fmus.toolchain.dyr_form import DyrRecord
-from fmus.wecc_renewable.dyr_records import CONTROLLER, CONTROLLER_RECORD, PLANT_RECORDS
+from fmus.wecc_renewable.dyr_records import (
+    CONTROLLER,
+    CONTROLLER_RECORD,
+    PLANT_RECORDS,
+    SAME_RECORDS,
+)
 from orchestrator.cases.networks.psse.air_conditioners import AIR_CONDITIONERS
 from orchestrator.cases.networks.psse.composite_loads import COMPOSITE_NAMES
 from orchestrator.cases.networks.psse.composite_loads import MODEL as MODEL_OF_MOTORS
@@ -124,7 +129,9 @@ def _of_machines() -> Iterator[KnownRecord]:
 
 def _of_plants() -> Iterator[KnownRecord]:
     for name, record in PLANT_RECORDS.items():
-        yield KnownRecord(name, _KINDS[record.kind], record.part, _GENERIC, _of_plant(name))
+        own = KnownRecord(name, _KINDS[record.kind], record.part, _GENERIC, _of_plant(name))
+        yield own
+        yield from (replace(own, name=x) for x, same in SAME_RECORDS.items() if same == name)
 
 
 def _of_distributed() -> Iterator[KnownRecord]:

@@ -8,6 +8,7 @@ import xarray as xr
 
 from fmus.wecc_renewable.dyr_records import PLANT_RECORDS
 from orchestrator.cases.case import load_case, with_protection
+from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.core.errors import CaseError
 from tests.cases.networks.psse.test_dyr_following import REGCA1, dyr, prepared, record
 from tests.support.mill import mill_case
@@ -56,6 +57,15 @@ def test_records_are_the_whole_unit_with_its_own_values(electrical, prepared):
     }.items() <= plan.parameters.items()
     assert ("electrical.only_in_dips" in plan.parameters) == (electrical == "REECB1")
     assert plan.parameters.get("electrical.Iq4", 1.2) == 1.2
+
+
+def test_repcta1_is_repca1_under_the_name_it_has_beside_turbines_of_type_3(tmp_path):
+    """PowerWorld's help says so, and a national system's file has as many values under either name."""
+    of_wind, plain = tmp_path / "wind.dyr", tmp_path / "plain.dyr"
+    plain.write_text(PLANT.format(""))
+    of_wind.write_text(PLANT.format("").replace("REPCA1", "REPCTA1"))
+    (found,), (wanted,) = read_dyr(of_wind), read_dyr(plain)
+    assert (found.name, found.values) == (wanted.name, wanted.values)
 
 
 @pytest.mark.parametrize("circuit", ["0 ", "1", "A", ""])
