@@ -1,12 +1,12 @@
 """An FMU's binary: loaded, with a reason where it cannot be, and its functions compared with what the FMU declares."""
 
 import ctypes
-import inspect
 import os
 import re
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import fmpy
@@ -161,20 +161,32 @@ class FMU2Tolerant(FMU2Slave):  # type: ignore[misc]
         super().__init__(**arguments)
 
     def _loadFunctions(self) -> None:
-        _describe_functions()
         for name in self._absent_functions:
             setattr(self.dll, name, _Absent(lambda name=name: self._refuse_call(name)))  # type: ignore[misc]
-        super()._loadFunctions()
+        for name, told in _prototypes().items():
+            function = getattr(self.dll, name)
+            function.argnames, function.argtypes = told.argnames, told.argtypes
+            function.restype = told.restype
+            self._functions[name] = function
+
+
+class _Library:
+    """In the place of a library: fmpy describes functions that nobody calls."""
+
+    def __getattr__(self, name: str) -> SimpleNamespace:
+        return SimpleNamespace()
 
 
 @cache
-def _describe_functions() -> None:
-    """Keep the signature of each of fmpy's functions at the function.
+def _prototypes() -> dict[str, SimpleNamespace]:
+    """Names and types of the arguments, and type of the result, of each of fmpy's functions.
 
-    Fmpy asks for it anew with each instance, and that is a third of what opening one takes."""
-    for name in _FUNCTIONS:
-        function = getattr(FMU2Slave, name)
-        function.__signature__ = inspect.signature(function)
+    Fmpy reads them from its own methods anew for each instance, which is a third of what opening one takes."""
+    described = FMU2Slave.__new__(FMU2Slave)
+    described.dll, described._functions = _Library(), {}
+    FMU2Slave._loadFunctions(described)
+    prototypes: dict[str, SimpleNamespace] = described._functions
+    return prototypes
 
 
 def in_words_of_2(absent: set[str]) -> set[str]:

@@ -5,6 +5,7 @@ module of the FMU would stand before an installed one of that name, and stay in 
 looks into the FMU only where code of the FMU asks, or its binary does."""
 
 import builtins
+import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -150,7 +151,7 @@ _loading: list[BroughtModules] = []
 
 def brought_by(resources: Path) -> BroughtModules:
     """The modules of an FMU that lies in this folder, for all its instances: a class made for each would never go."""
-    for place in [place for place in _known.keys() - _living.keys() if not Path(place).exists()]:
+    for place in [place for place in _known.keys() - _living.keys() if not os.path.exists(place)]:
         del _known[place]
     return _known.setdefault(str(resources), BroughtModules(str(resources)))
 
