@@ -23,6 +23,7 @@ from orchestrator.face.cli import main
 from tests.support import once
 from tests.support.bytecode import TESTS, import_share, keep
 from tests.support.durations import MEASURED, Measure, longest_first, mark
+from tests.support.reports import FewReports, asks_for_seconds
 from tests.support.skips import Skips, in_ci
 
 
@@ -38,8 +39,11 @@ def pytest_configure(config):
         # a shell starts what runs in its background deaf to Ctrl-C, and all that this starts would
         # be: tests of interrupts would wait for ever
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    if in_ci() and not hasattr(config, "workerinput"):
+    worker = hasattr(config, "workerinput")
+    if in_ci() and not worker:
         config.pluginmanager.register(Skips(), "skips")
+    if worker and not asks_for_seconds(config):
+        config.pluginmanager.register(FewReports(), "few reports")
     if MEASURED in os.environ:
         config.pluginmanager.register(Measure(Path(os.environ[MEASURED])), "seconds")
 
