@@ -20,6 +20,7 @@ from numpy.typing import DTypeLike, NDArray
 from fmus.toolchain.compiler import compile_here
 from orchestrator.core.cores import MOST_THREADS, number_of_cores
 from orchestrator.core.interrupts import calls
+from orchestrator.systems.coupling.noted_steps import NotedSteps
 from orchestrator.systems.coupling.sharing import Trial, best_number, shares, worth_sharing
 from orchestrator.systems.coupling.tracks import Tracks
 from orchestrator.systems.coupling.turns import Turn, not_finite
@@ -89,6 +90,7 @@ def _dismiss(library: Any, memory: Any, threads: list[Thread]) -> None:
 
 SOURCES = ("team.c", "inner_loop.c")  # compiled as one
 _FUNCTIONS = {1: "fmi2SetReal", 2: "fmi2DoStep", 3: "fmi2GetReal"}
+_NOTE = 4  # a reading of `NotedSteps`
 _NOT_FINITE = -1
 
 _LOOKED_AT = 20
@@ -159,7 +161,7 @@ def loop_library() -> Any | None:
         return None
     address, integer = ctypes.c_void_p, ctypes.c_int64
     library.advance.argtypes = [
-        *(address, address, integer, address, address, integer, integer),
+        *(address, address, integer, address, address, address, integer, integer),
         *(ctypes.c_double, address),
     ]
     library.advance_lines.argtypes = [
@@ -203,6 +205,7 @@ class CompiledLoop:
         self._members: list[range] = []
         self._failure = (ctypes.c_int64 * 3)()
         self.completed = 0
+        self.rows: NotedSteps | None = None  # that an observer takes
         self.before: NDArray[np.float64] | None = None
         first = 0
         for group, entry in zip(groups, self._groups, strict=True):
@@ -283,6 +286,7 @@ class CompiledLoop:
     def advance(self, index: int, count: int, step_size: float) -> None:
         status = 0
         self.completed = 0
+        rows = None if self.rows is None else self.rows.address
         with calls:
             while self.completed < count and not status:
                 part, team = self._next(count - self.completed)
@@ -293,6 +297,7 @@ class CompiledLoop:
                     len(self._groups),
                     None if team is None else team.address,
                     self._place,
+                    rows,
                     index + self.completed,
                     part,
                     step_size,
@@ -307,9 +312,12 @@ class CompiledLoop:
         if status == _NOT_FINITE:
             outputs = self._exchanges[self._failure[1]].outputs
             raise not_finite(outputs, self._failure[2], (self._failure[0] + 1) * step_size)
-        if status:
-            component = self._exchanges[self._failure[1]].component
-            component.check(status, _FUNCTIONS[self._failure[2]], self._failure[0] * step_size)
+        done, place, stage = self._failure
+        if status and stage == _NOTE and self.rows is not None:
+            self.rows.component(place).check(status, "fmi2GetReal", done * step_size)
+        elif status:
+            component = self._exchanges[place].component
+            component.check(status, _FUNCTIONS[stage], done * step_size)
 
     def _next(self, count: int) -> tuple[int, Team | None]:
         """How many communication steps are next, at most ``count``, and who does them; None is the caller alone."""

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.systems.coupling.noted_steps import NotedSteps
 from orchestrator.systems.coupling.observers import ObservedRun
 from orchestrator.systems.coupling.recorder import Recorder
 from orchestrator.systems.coupling.recording_blocks import RowSink
@@ -22,7 +23,8 @@ FILTER = (
 """What a row is made by, in words."""
 
 # steps whose values are kept until they are added to the rows that they are part of
-_MOST_READ = 1024
+_READ = 256  # at most, in whole intervals; a longer interval is one by itself
+_MOST_READ = 1024  # of a longer interval
 
 
 class FilteredRecorder(Recorder):
@@ -40,13 +42,15 @@ class FilteredRecorder(Recorder):
         self.interval = interval
         self._weights, self._sums_of_weights = np.empty(0), np.empty(0)
         self._input = np.empty((0, 0))
+        self._unread: NotedSteps | None = None
+        self._order: NDArray[np.intp] = np.empty(0, dtype=np.intp)
         self._inputs_before = self._inputs = self._next = 0
         self._first_values = self._last_values = np.empty(0)
         self._pending: dict[int, NDArray[np.float64]] = {}
         self._pending_times: dict[int, float] = {}
 
     def begin(self, run: ObservedRun, stop_index: int) -> None:
-        resumed = self._position
+        resumed, self.every = self._position, 1
         super().begin(run, stop_index)
         from scipy.signal import firwin  # noqa: PLC0415 - a quarter of a second that few need
 
@@ -61,26 +65,56 @@ class FilteredRecorder(Recorder):
         if self.interval == 1:
             self._weights[self._half] = 1.0
         self._sums_of_weights = np.concatenate([[0.0], np.cumsum(self._weights)])
-        self._input = np.empty((min(_MOST_READ, max(1, self.interval)), len(self.names)))
+        read = self.interval * max(1, _READ // self.interval)
+        self._input = np.empty((min(_MOST_READ, read), len(self.names)))
+        self._let_the_loop_read(run)
         self._inputs_before = self._inputs = self._next = 0
         self._pending, self._pending_times = {}, {}
         if resumed is not None:
             self._restore(resumed)
 
+    def _let_the_loop_read(self, run: ObservedRun) -> None:
+        """Look at a block of steps at once where the loop reads after each of them."""
+        self._unread = run.rows_of_steps([batch for batch, _ in self._batches], len(self._input))
+        if self._unread is None:
+            return
+        self.every = len(self._input)
+        columns = [number for _, of_batch in self._batches for number in of_batch]
+        self._order = np.argsort(columns)
+
     def observe(self, run: ObservedRun) -> None:
+        self._take_unread()
         if run.index == self._last_index:
-            return  # taken up again where this step was read already
+            return  # read with those before it, or before the run was taken up again
+        row = np.empty((1, len(self.names)))
+        self._read(row[0])
+        self._add_steps(row, [run.time])
         self._last_index = run.index
-        number = self._inputs_before + self._inputs
-        row = self._input[self._inputs]
-        self._read(row)
-        if number == 0:
-            self._first_values = row.copy()
-        if number % self.interval == 0:
-            self._pending_times[number // self.interval] = run.time
-        self._inputs += 1
-        if self._inputs == len(self._input):
-            self._take_in()
+
+    def _take_unread(self) -> None:
+        """Add the steps that the loop read."""
+        if self._unread is None:
+            return
+        indices, times, rows = self._unread.take()
+        if indices:
+            self._add_steps(rows[:, self._order], times)
+            self._last_index = indices[-1]
+
+    def _add_steps(self, rows: NDArray[np.float64], times: Sequence[float]) -> None:
+        """Add steps, shape (steps, variables), in as many blocks as they fill."""
+        begin = 0
+        while begin < len(rows):
+            number = self._inputs_before + self._inputs
+            part = rows[begin : begin + len(self._input) - self._inputs]
+            self._input[self._inputs : self._inputs + len(part)] = part
+            if number == 0:
+                self._first_values = part[0].copy()
+            for k in range(-number % self.interval, len(part), self.interval):
+                self._pending_times[(number + k) // self.interval] = times[begin + k]
+            self._inputs += len(part)
+            begin += len(part)
+            if self._inputs == len(self._input):
+                self._take_in()
 
     def _take_in(self) -> None:
         """Add what was read to the rows that it is part of, and record those that are complete."""
@@ -110,6 +144,9 @@ class FilteredRecorder(Recorder):
 
     def end(self, run: ObservedRun) -> None:
         """Record the last rows, as if the last values went on."""
+        self._take_unread()
+        if self._unread is not None:
+            self._unread.close()
         self._take_in()
         for number in sorted(self._pending_times):
             missing = number * self.interval + self._half + 1 - self._inputs_before
@@ -120,6 +157,7 @@ class FilteredRecorder(Recorder):
 
     def position(self) -> dict[str, Any]:
         """Position as `Recorder.position` gives it, with the rows that are not complete."""
+        self._take_unread()
         numbers = sorted(self._pending)
         sums = np.array([self._pending[n] for n in numbers]).reshape(len(numbers), len(self.names))
         times = np.array([[n, t] for n, t in sorted(self._pending_times.items())]).reshape(-1, 2)

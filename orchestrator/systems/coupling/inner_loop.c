@@ -45,7 +45,36 @@ struct group {
     int64_t n_own;
 };
 
-enum { NONE = 0, SET = 1, STEP = 2, GET = 3, NOT_FINITE = -1 };
+enum { NONE = 0, SET = 1, STEP = 2, GET = 3, NOTE = 4, NOT_FINITE = -1 };
+
+/* Variables of one component that an observer wants after each step, and its rows of them (`noted_steps.py`). */
+struct reading {
+    void *component;
+    get_set get_real;
+    const unsigned *references;
+    int64_t n;
+};
+
+struct rows {
+    const struct reading *readings;
+    double *values; /* `most` rows of `width` numbers, of which `filled` wait for the observer */
+    int64_t n_readings, width, most, filled, index; /* index: of the newest */
+};
+
+/* Add a row for the step that ends at `index`; the status of a reading that was refused, which is named by its place. */
+static int note(struct rows *rows, int64_t index, int64_t *place) {
+    if (rows->filled == rows->most) return 0;
+    double *row = rows->values + rows->filled * rows->width;
+    for (int64_t i = 0; i < rows->n_readings; ++i) {
+        const struct reading *r = &rows->readings[i];
+        const int status = r->n ? r->get_real(r->component, r->references, (size_t)r->n, row) : 0;
+        *place = i;
+        if (status > 1) return status;
+        row += r->n;
+    }
+    rows->filled += 1, rows->index = index;
+    return 0;
+}
 
 /* Note new outputs; the index of the first that is no finite number, or -1. */
 static int64_t follow(struct track *tracks, const double *values, int64_t n) {
@@ -179,11 +208,12 @@ static int step_group(struct now *now, const struct group *g, struct team *team,
     return 0;
 }
 
-/* Do `count` communication steps from `index`. Returns 0, or the status of the call that failed with
-   failure = {steps completed, call, SET | STEP | GET}; or NOT_FINITE with failure = {steps completed, call, output}.
+/* Do `count` communication steps from `index`; after each, an observer's `rows` get one, unless there is none (NULL).
+   Returns 0, or the status of the call that failed with failure = {steps completed, call, SET | STEP | GET} or
+   {steps completed, reading, NOTE}; or NOT_FINITE with failure = {steps completed, call, output}.
    Where several are refused in one step, it is the first in the schedule's order, whoever did it. */
 EXPORT int advance(struct call *calls, const struct group *groups, int64_t n_groups, struct team *team, const double *y,
-                   int64_t index, int64_t count, double step_size, int64_t *failure) {
+                   struct rows *rows, int64_t index, int64_t count, double step_size, int64_t *failure) {
     struct now now = {calls, y, 0, step_size};
     if (team) team_agree(team, whole_call, &now);
     for (int64_t k = index; k < index + count; ++k) {
@@ -194,6 +224,11 @@ EXPORT int advance(struct call *calls, const struct group *groups, int64_t n_gro
                 failure[0] = k;
                 return status;
             }
+        }
+        const int refused = rows ? note(rows, k + 1, &failure[1]) : 0;
+        if (refused) {
+            failure[0] = k + 1, failure[2] = NOTE;
+            return refused;
         }
     }
     return 0;

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from orchestrator.devices.fmi.component import Component
+    from orchestrator.devices.fmi.component import Component, RealBatch
+    from orchestrator.systems.coupling.noted_steps import NotedSteps
     from orchestrator.systems.coupling.tracks import Tracks
 
 
@@ -38,6 +39,11 @@ class ObservedRun(Protocol):
     @property
     def tracks(self) -> Tracks:
         """Where each coupled output went, step by step, since an observer last looked."""
+
+    def rows_of_steps(self, batches: Sequence[RealBatch], most: int) -> NotedSteps | None:
+        """Return what the inner loop will read after each step from now on, at most so many steps before it is taken.
+
+        None where the loop cannot, or does it for another observer: then one has to look after each step."""
 
     def exchange(self) -> None:
         """Hand every component the newest outputs of its partners."""

@@ -17,6 +17,7 @@ from orchestrator.systems.coupling import compiled_loop
 from orchestrator.systems.coupling.adaptive import AdaptiveLoop
 from orchestrator.systems.coupling.compiled_loop import CompiledLoop
 from orchestrator.systems.coupling.coupled import CoupledComponents, open_plan
+from orchestrator.systems.coupling.noted_steps import NotedSteps
 from orchestrator.systems.coupling.schedule import Schedule
 from orchestrator.systems.coupling.second_order import line_loop
 from orchestrator.systems.coupling.statistics import ComponentStatistics, StepStatistics
@@ -172,6 +173,16 @@ class Stepper(CoupledComponents):
     @property
     def time(self) -> float:
         return self.clock.time(self.index)
+
+    def rows_of_steps(self, batches: Sequence[RealBatch], most: int) -> NotedSteps | None:
+        """See `ObservedRun.rows_of_steps`."""
+        loop = self._loop
+        if not isinstance(loop, CompiledLoop) or self.schedule.is_second_order:
+            return None
+        if loop.rows is not None and loop.rows.address is not None:
+            return None
+        loop.rows = NotedSteps(batches, most, self.clock.time)
+        return loop.rows
 
     def exchange(self) -> None:
         """Send every component the newest outputs of its partners, all at once or as the schedule has it."""

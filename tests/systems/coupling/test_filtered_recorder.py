@@ -1,13 +1,21 @@
 """Rows at longer intervals, of which each is a weighted mean of the steps around it."""
 
+from ctypes import CFUNCTYPE, c_int, c_size_t, c_void_p
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from orchestrator.core.errors import ComponentError
+from orchestrator.systems.coupling import compiled_loop as loops
 from orchestrator.systems.coupling import recorder as module
+from orchestrator.systems.coupling.events import ParameterChange
 from orchestrator.systems.coupling.filtered_recorder import FilteredRecorder
+from orchestrator.systems.coupling.master import Master
+from orchestrator.systems.coupling.schedule import jacobi
+from orchestrator.systems.coupling.system import System
 from tests.support.late import LateLibrary
+from tests.systems.coupling.small_fmus import small_fmu
 
 scipy_signal = LateLibrary("scipy.signal")
 STEP = 1e-3
@@ -26,7 +34,7 @@ def system(monkeypatch):
     monkeypatch.setattr(module, "RealBatch", Batch)
 
     def make(values):
-        run = SimpleNamespace(index=0, time=0.0, components={})
+        run = SimpleNamespace(index=0, time=0.0, components={}, rows_of_steps=lambda *_: None)
         description = SimpleNamespace(variables={"y": None, "z": None})
         run.components["a"] = SimpleNamespace(run=run, description=description, values=values)
         return run
@@ -100,3 +108,45 @@ def test_it_is_taken_up_again_to_the_last_bit(system, at):
     second.end(run)
     assert np.array_equal(second.times, whole.times)
     assert np.array_equal(second.values, whole.values)
+
+
+def ring_of_two():
+    system = System()
+    system.add("a", small_fmu("integrator"), {"gain": 30.0, "x_0": 1.0})
+    system.add("b", small_fmu("integrator"), {"gain": -20.0, "x_0": 0.5})
+    system.connect("a.y", "b.u")
+    system.connect("b.y", "a.u")
+    return system
+
+
+@pytest.mark.skipif(loops.loop_library() is None, reason="no compiler for this platform")
+def test_the_loop_in_c_reads_the_steps_that_the_loop_in_python_lets_be_read(monkeypatch):
+    """Through a change that falls into a block of steps, and to an end that does."""
+    found, looks = [], []
+    for library in (loops.loop_library(), None):
+        monkeypatch.setattr(loops, "loop_library", lambda library=library: library)
+        recorder = FilteredRecorder(["b.y", "a.y", "b.u"], 7)
+        with Master(ring_of_two(), jacobi(("a", "b")), STEP) as master:
+            master.run(0.4, [ParameterChange(0.1, "a", "gain", 40.0)], [recorder])
+        found.append(np.column_stack([recorder.times, recorder.values]))
+        looks.append(recorder.every)
+    assert np.array_equal(*found)
+    assert looks == [252, 1]
+
+
+@pytest.mark.skipif(loops.loop_library() is None, reason="no compiler for this platform")
+def test_a_reading_that_an_fmu_refuses_ends_the_run_at_its_time_with_the_rows_before():
+    recorder, calls = FilteredRecorder(["b.y", "a.y"], 1), []
+    with Master(ring_of_two(), jacobi(("a", "b")), STEP) as master:
+        component = master.components["a"]
+        read = component.get_real
+
+        @CFUNCTYPE(c_int, c_void_p, c_void_p, c_size_t, c_void_p)
+        def refuse_the_fifth(*arguments):
+            calls.append(1)
+            return 3 if len(calls) == 5 else read(*arguments)
+
+        component.get_real = refuse_the_fifth
+        with pytest.raises(ComponentError, match=r"'a' at t = 0\.004 s: fmi2GetReal"):
+            master.run(0.4, [], [recorder])
+    assert recorder.times.tolist() == [k * STEP for k in range(4)]
