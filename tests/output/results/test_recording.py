@@ -1,13 +1,11 @@
 """A recording that grows on the disk: what is read at any moment is what was recorded until then."""
 
 import json
+import multiprocessing
 import os
 import resource
-import signal
-import subprocess
 import sys
 import time
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -219,38 +217,33 @@ def test_the_folder_is_removed_meanwhile(tmp_path, prepared):
         recording.keep(0, rows.times, rows.values)
 
 
-WRITER = """
-import sys
-from pathlib import Path
-sys.path.insert(0, {root!r})
-from orchestrator.cases.case import load_case
-from orchestrator.output.results.recording_writer import RecordingFolder
-from tests.output.results.test_recording import Rows, keep
-(prepared,) = load_case("infinite_bus").prepare(["dip"])
-recording = RecordingFolder(Path(sys.argv[1]), prepared)
-rows = Rows(200_000)
-print("begin", flush=True)
-keep(recording, rows, 1000)
-recording.join(Path(sys.argv[1]).parent / "trajectory.nc")
-print("end", flush=True)
-"""
+def write_all(folder, prepared, rows, begun):
+    """The first process: a recording from its begin to the joined file."""
+    recording = RecordingFolder(folder, prepared)
+    begun.set()
+    keep(recording, rows, 1000)
+    recording.join(folder.parent / "trajectory.nc")
 
 
 @pytest.mark.slow
-def test_what_is_read_while_it_is_written_and_after_a_kill(tmp_path):
+@pytest.mark.skipif(sys.platform != "linux", reason="the writer is a copy of this process")
+def test_what_is_read_while_it_is_written_and_after_a_kill(tmp_path, prepared):
     """A second process reads while the first writes; the first is killed at moments that chance chooses."""
     chance, rows, lengths = np.random.default_rng(5), Rows(200_000), []
-    command = [sys.executable, "-c", WRITER.format(root=str(Path(__file__).parents[3]))]
+    copies = multiprocessing.get_context("fork")
     for number in range(8):
         folder = tmp_path / str(number) / "recording"
-        with subprocess.Popen([*command, str(folder)], stdout=subprocess.PIPE) as writer:
-            assert writer.stdout.readline() == b"begin\n"
-            count = int(chance.integers(0, 12))  # of parts: how long they take is the disk's
-            while len(parts_of(folder)) < count and writer.poll() is None:
-                time.sleep(0.002)
-            lengths += [check_read(folder, rows)]
-            time.sleep(chance.uniform(0, 0.2))
-            writer.send_signal(signal.SIGKILL)
+        begun = copies.Event()
+        writer = copies.Process(target=write_all, args=(folder, prepared, rows, begun))
+        writer.start()
+        assert begun.wait(60)
+        count = int(chance.integers(0, 12))  # of parts: how long they take is the disk's
+        while len(parts_of(folder)) < count and writer.is_alive():
+            time.sleep(0.002)
+        lengths += [check_read(folder, rows)]
+        time.sleep(chance.uniform(0, 0.2))
+        writer.kill()
+        writer.join()
         lengths += [check_read(folder, rows)]
     assert len(set(lengths)) > 5
     assert max(lengths) > 0

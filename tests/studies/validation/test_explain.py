@@ -18,7 +18,11 @@ from tests.support.late import LateLibrary
 
 scipy_signal = LateLibrary("scipy.signal")
 ON = {"pod_p.enabled": True}
-STEP = "200 us"
+STEP = "500 us"
+"""Of the device, so that less time goes."""
+
+FINE = "200 us"
+"""Where a limit, a lag or the noise decides what is found."""
 
 
 def explained(frame, device="gfor", **more):
@@ -200,7 +204,7 @@ def test_a_limit_of_the_current_that_is_too_high_in_the_model_is_named_with_the_
     limits = {"gfor__current_limit__kind": 1, "gfor__current_limit__I_max": 1.02}
     frame = with_noise(table(run("pod_p", stop=3.0, scale=1.12, **limits)))
     values = ON | {"current_limit.kind": 1, "current_limit.I_max": 1.2}
-    best, *_ = explained(frame, values=values)
+    best, *_ = explained(frame, values=values, step=FINE)
     assert (best.cause, best.name, best.now) == (CauseKind.VALUE, "current_limit.I_max", 1.2)
     assert best.value == pytest.approx(1.02, rel=0.001)
     assert best.share > 0.99
@@ -210,7 +214,7 @@ def test_no_cause_is_read_from_what_follows_a_setpoint_that_changed():
     """A right model, and a plant whose reference steps: a washout explained most of it, and was named."""
     frame = with_noise(table(run("pod_p", stop=4.0)))
     moved = frame.assign(p_mw=frame.p_mw + 75 * (frame.time > 2.5)).set_index("time")
-    found = gfor_in_python.validate("gfor", moved, values=ON, step=STEP, explain=True)
+    found = gfor_in_python.validate("gfor", moved, values=ON, step=FINE, explain=True)
     (question,) = [
         one for one in found.as_json()["events"][0]["questions"] if one["kind"] == "setpoint"
     ]
@@ -307,7 +311,7 @@ def test_an_error_that_is_noise_has_no_cause_and_one_clearly_beyond_it_has():
 def test_no_cause_is_likely_beside_a_right_model():
     """With this noise a filter's reactance, a droop's time and a resistance explained 70 to 100 %."""
     frame = with_noise(table(run("pod_p", stop=4.0)), seed=11).set_index("time")
-    found = gfor_in_python.validate("gfor", frame, values=ON, explain=True, step=STEP)
+    found = gfor_in_python.validate("gfor", frame, values=ON, explain=True, step=FINE)
     causes = found.result.explanations
     assert causes[0].share > 0.9
     assert not any(one.explains for one in causes)
@@ -341,7 +345,7 @@ def behind_a_lag(frame, column, seconds=0.1):
 def test_a_lag_that_leaves_noise_alone_is_the_cause_and_nothing_is_tried_beside_it():
     noisy = with_noise(behind_a_lag(table(run("pod_p", stop=4.0)), "p_mw"))
     found = gfor_in_python.validate(
-        "gfor", noisy.set_index("time"), values=ON, explain=True, step=STEP
+        "gfor", noisy.set_index("time"), values=ON, explain=True, step=FINE
     ).result
     (lag,) = found.explanations
     assert (lag.cause, lag.name) == (CauseKind.LAG, "lag of P")
@@ -358,6 +362,6 @@ def test_a_lag_that_leaves_noise_alone_is_the_cause_and_nothing_is_tried_beside_
 def test_a_lag_beside_a_wrong_parameter_is_not_all():
     noisy = with_noise(behind_a_lag(table(run("pod_p", stop=4.0)), "p_mw"))
     off = ON | {"droop.R_V": 0.05}
-    found = gfor_in_python.validate("gfor", noisy.set_index("time"), values=off, step=STEP).result
+    found = gfor_in_python.validate("gfor", noisy.set_index("time"), values=off, step=FINE).result
     assert [one.kind for one in found.comparisons[0].questions] == [QuestionKind.LAGGED]
     assert lag_alone(found.comparisons) is None

@@ -100,7 +100,7 @@ def test_three_parameters_are_found_from_a_start_at_which_the_ringing_is_out_of_
     frame = with_noise(table(run("pod_p", gfor__pod_p__K=120.0)), 0).set_index("time")
     names = list(TRUTH)[:3]
     values = ON | starts_of(0, names)
-    found = gfor_in_python.validate("gfor", frame, values=values, fit=names)
+    found = gfor_in_python.validate("gfor", frame, values=values, fit=names, step=STEP)
     assert found.result.fit.reached
     for row in found.fitted().itertuples():
         assert row.low < TRUTH[row.parameter] < row.high

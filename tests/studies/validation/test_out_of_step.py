@@ -60,7 +60,7 @@ def test_the_plants_own_values_stay_in_step(recorded):
 
 
 def test_the_gain_that_makes_a_model_fall_is_named_with_the_plants(recorded):
-    best, *_ = validated(recorded, MODEL, explain=True).result.explanations
+    best, *_ = validated(recorded, MODEL, explain=True, step="500 us").result.explanations
     assert best.name == "pod_p.K"
     assert best.value == pytest.approx(60, rel=0.05)
 

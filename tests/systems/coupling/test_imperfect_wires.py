@@ -200,9 +200,7 @@ def test_noise_has_its_deviation_and_no_memory(inner_loop):
 
 
 def test_noise_with_a_bandwidth_has_the_same_deviation_and_the_low_pass_memory(inner_loop):
-    values = noise_of(
-        Noise(0.3, 1, bandwidth=20.0), 200_000 if inner_loop == "compiled" else 20_000
-    )
+    values = noise_of(Noise(0.3, 1, bandwidth=20.0), 60_000 if inner_loop == "compiled" else 20_000)
     keep = np.exp(-2 * np.pi * 20.0 * H)
     effective = len(values) * (1 - keep) / (1 + keep)
     assert abs(values.std() / 0.3 - 1) < 4 / np.sqrt(2 * effective)
