@@ -17,6 +17,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.sandbox import wine
 from orchestrator.face.cli import COMMANDS, GROUPS, OLD, QUESTIONS, _command_in, _parser
+from tests.support.once import made_once
 from tests.support.scenarios import prepare_one
 from tests.systems.coupling.small_fmus import small_fmu
 
@@ -420,20 +421,25 @@ def test_info_on_an_fmu_for_other_platforms(gfor, damaged, monkeypatch, tmp_path
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory):
+def results():
     """Folder and printed text of a short run of the two-area case."""
-    folder = tmp_path_factory.mktemp("run") / "results"
-    command = ["run", "two_area", "--stop", "0.2", "--scenario", "pod_p", "--out", str(folder)]
-    done = subprocess.run(
-        [sys.executable, "-m", "orchestrator.face.cli", *command],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0
-    (question,) = done.stderr.splitlines()
-    assert "the event at 1 s never happens, as the run stops at 0.2 s" in question
-    return folder, done.stdout
+
+    def run(folder):
+        command = ["run", "two_area", "--stop", "0.2", "--scenario", "pod_p", "--out", "results"]
+        done = subprocess.run(
+            [sys.executable, "-m", "orchestrator.face.cli", *command],
+            capture_output=True,
+            text=True,
+            check=False,
+            cwd=folder,
+        )
+        assert done.returncode == 0
+        (question,) = done.stderr.splitlines()
+        assert "the event at 1 s never happens, as the run stops at 0.2 s" in question
+        (folder / "printed.txt").write_text(done.stdout, encoding="utf-8")
+
+    folder = made_once("run_of_commands", run)
+    return folder / "results", (folder / "printed.txt").read_text(encoding="utf-8")
 
 
 def test_the_trajectory_has_units_and_says_where_it_comes_from(results):
