@@ -4,14 +4,14 @@ PSS/E starts such a machine, warns of suspect initial conditions and lets it dri
 widen the limit. The FMU itself is asked what it starts with, so that nothing is known here of its equations."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from orchestrator.cases.form.control_limits import is_limit, is_upper
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.scenario.service import in_service
 from orchestrator.core.bisection import halve_towards
 from orchestrator.devices.fmi.instance import is_ours
-from orchestrator.systems.coupling.coupled import refusal_to_start
+from orchestrator.systems.coupling.coupled import Trials
 from orchestrator.systems.coupling.system import ComponentPlan
 
 HEADROOM = 0.1
@@ -56,11 +56,13 @@ def limits_to_widen(prepared: PreparedScenario) -> list[WidenedLimit]:
 
 def limits_of_machine(name: str, plan: ComponentPlan) -> list[WidenedLimit]:
     """Find the limits for which one machine of ours cannot start, in the order of its parameters; see above."""
+    with Trials(name, plan) as trials:
+        return _limits_found(name, plan, lambda values: trials.refusal(values) is None)
 
-    def starts(values: dict[str, float]) -> bool:
-        trial = replace(plan, parameters=plan.parameters | values)
-        return refusal_to_start(name, trial) is None
 
+def _limits_found(
+    name: str, plan: ComponentPlan, starts: Callable[[dict[str, float]], bool]
+) -> list[WidenedLimit]:
     if starts({}):
         return []
     opened = {x: _bounded(plan, x, _OPEN) for x in plan.description.parameters if is_limit(x)}

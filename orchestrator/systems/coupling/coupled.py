@@ -1,9 +1,9 @@
 """FMUs brought to life, connected, and initialised together."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -245,7 +245,21 @@ def _begin(component: Component, plan: ComponentPlan, stop_time: float | None) -
 
 def refusal_to_start(name: str, plan: ComponentPlan) -> ComponentError | None:
     """Return the error with which a component of ours refuses to start by itself; None where it starts."""
-    with unpacked(plan.description.path) as folder, open_plan(name, plan, folder) as component:
+    with Trials(name, plan) as trials:
+        return trials.refusal({})
+
+
+class Trials(Closing):
+    """Starts of a component of ours by itself, one after the other: to open an instance takes longer than a start."""
+
+    def __init__(self, name: str, plan: ComponentPlan) -> None:
+        self._name, self._plan, self._release = name, plan, ExitStack()
+        self._component: Component | None = None
+
+    def refusal(self, parameters: Mapping[str, float]) -> ComponentError | None:
+        """Return the error with which it refuses to start with other values of parameters; None where it starts."""
+        plan = replace(self._plan, parameters={**self._plan.parameters, **parameters})
+        component = self._renewed()
         try:
             _begin(component, plan, None)
             component.enter_initialization_mode()
@@ -253,7 +267,22 @@ def refusal_to_start(name: str, plan: ComponentPlan) -> ComponentError | None:
             component.exit_initialization_mode()
         except ComponentError as error:
             return error
-    return None
+        return None
+
+    def _renewed(self) -> Component:
+        """The instance as if it were new, or a new one where it cannot be reset any more."""
+        if self._component is not None:
+            try:
+                self._component.reset()
+                return self._component
+            except ComponentError:
+                self._release.close()
+        folder = self._release.enter_context(unpacked(self._plan.description.path))
+        self._component = self._release.enter_context(open_plan(self._name, self._plan, folder))
+        return self._component
+
+    def close(self) -> None:
+        self._release.close()
 
 
 def _check_taken(name: str, component: Component, plan: ComponentPlan) -> None:
