@@ -212,7 +212,9 @@ class FourVsc:
         return found
 
     def rates(self):
-        """The function of all states that gives their rates, and the operating point."""
+        """The function of all states that gives their rates, and the operating point.
+
+        States may be a matrix with a column for each of several places."""
         units, E, x_0 = self.start()
         coils, size = self._coils(), 13
         B = np.zeros(7)
@@ -226,7 +228,7 @@ class FourVsc:
         impedances = np.linalg.inv(Y)
 
         def injected(x):
-            I = np.zeros(7, complex)  # noqa: E741
+            I = np.zeros((7, *x.shape[1:]), complex)  # noqa: E741
             for a, (u, k, _, _) in enumerate(units):
                 d, q, theta = x[size * a : size * a + 3]
                 I[k] += (d + 1j * q) * np.exp(1j * theta) * u.S / 100 / u.ratio
@@ -235,10 +237,10 @@ class FourVsc:
         def network(x, I):  # noqa: E741
             z = x[size * len(units) :: 2] + 1j * x[size * len(units) + 1 :: 2]
             v, lines, rest = np.split(z, [7, 7 + len(self.branches)])
-            load = (
-                self.admittance.real * v * (np.arange(7) == C) if self.load == "parallel" else 0.0
-            )
-            I = I - B * 1j * v - load  # noqa: E741
+            through = 1j * B
+            if self.load == "parallel":
+                through[C] += self.admittance.real
+            I = I - (through * v.T).T  # noqa: E741
             rates = []
             for (i, j, R, X, _, n), now in zip(self.branches, lines, strict=True):
                 I[i] -= now
@@ -249,8 +251,8 @@ class FourVsc:
                 rates.append(W / X * (v[i] - (R + 1j * X) * now))
             I[C] += rest[-1]
             rates.append(W / self.Z_eq.imag * (E - v[C] - self.Z_eq * rest[-1]))
-            found = np.concatenate([W / B * I, rates])
-            return v, np.column_stack([found.real, found.imag]).ravel()
+            found = np.concatenate([(W / B * I.T).T, rates])
+            return v, np.stack([found.real, found.imag], axis=1).reshape(-1, *x.shape[1:])
 
         def f(x):
             I = injected(x)  # noqa: E741
@@ -258,7 +260,7 @@ class FourVsc:
                 v, rest = network(x, I)
             else:
                 I[C] += E / self.Z_eq
-                v, rest = impedances @ I, np.array([])
+                v, rest = impedances @ I, np.empty((0, *x.shape[1:]))
             own = [
                 self._converter(u, P, held, x[size * a : size * (a + 1)], v[k])
                 for a, (u, k, P, held) in enumerate(units)
@@ -328,8 +330,8 @@ class FourVsc:
 
 
 def _jacobian(f, x, step=1e-6):
-    columns = [(f(x + step * unit) - f(x - step * unit)) / (2 * step) for unit in np.eye(len(x))]
-    return np.array(columns).T
+    steps = step * np.eye(len(x))
+    return (f(x[:, None] + steps) - f(x[:, None] - steps)) / (2 * step)
 
 
 def with_all(system, **changes):
