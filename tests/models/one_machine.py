@@ -6,6 +6,7 @@ import numpy as np
 from scipy.optimize import fsolve
 
 from fmus.synchronous_generator.composed import synchronous_generator_phasor
+from fmus.toolchain.symbols import Function, symbols
 from orchestrator.cases.networks.psse.dyr import machine_models
 from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.raw_network import Machine
@@ -139,12 +140,11 @@ class OneMachine:
 
     def eigenvalues(self, step=1e-7):
         """Eigenvalues [rad/s] of the machine at its network, by differences about the start."""
-        seen = self.network.seen(self.network.lines)
-        x0 = np.array(self.device.x, dtype=float)
+        seen = _parts(self.network.seen(self.network.lines)[:2])
+        x0, (rates, _) = np.array(self.device.x, dtype=float), self._at_network(self.device.p)
 
         def rate(x):
-            v, _ = self._voltage(x, seen, self.device.p)
-            return self._rates(x, v, self.device.p)
+            return np.array(rates.values([x.tolist(), seen])[0])
 
         columns = [
             (rate(x0 + step * unit) - rate(x0 - step * unit)) / (2 * step)
@@ -152,50 +152,66 @@ class OneMachine:
         ]
         return np.linalg.eigvals(np.array(columns).T)
 
-    def _voltage(self, x, seen, p):
-        """Voltage of the machine's bus, and its current behind its admittance."""
-        model = self.device.model
-        names = [v.name for v in model.outputs]
-        i_at, y_at = (
-            [names.index(n) for n in pair] for pair in (("i_re", "i_im"), ("y_re", "y_im"))
-        )
-        still = np.array(model.outputs_function(x, [0.0, 0.0], p, self.device.c)).ravel()
-        current, y = complex(*still[i_at]), complex(*still[y_at])
-        v = (seen[0] + seen[1] * current) / (1 + seen[1] * y)
-        return v, current - y * v
+    def _at_network(self, p):
+        """Rates, and outputs with the machine's current behind its admittance, as functions at these parameters.
 
-    def _rates(self, x, v, p):
-        rates = self.device.model.derivatives(x, [v.real, v.imag], p, self.device.c)[0]
-        return np.array(rates, dtype=float).ravel()
+        Their arguments: the states; real and imaginary part of the network's open-circuit voltage, and of its
+        impedance."""
+        model, c = self.device.model, self.device.c
+        x, seen = symbols("x", len(model.states)), symbols("seen", 4)
+        still = _by_name(model, model.outputs_function.of(x, [0.0, 0.0], p, c))
+        current, y = (still["i_re"], still["i_im"]), (still["y_re"], still["y_im"])
+        dropped, turned = _product(seen[2:], current), _product(seen[2:], y)
+        below = 1 + turned[0], -turned[1]  # conjugate
+        size = below[0] * below[0] + below[1] * below[1]
+        v = [part / size for part in _product((seen[0] + dropped[0], seen[1] + dropped[1]), below)]
+        through = _product(y, v)
+        out = [*model.outputs_function.of(x, v, p, c)[0]]
+        out += [current[0] - through[0], current[1] - through[1]]
+        rates = model.derivatives.of(x, v, p, c)[0]
+        return Function("rates", [x, seen], [rates]), Function("outputs", [x, seen], [out])
 
     def run(self, lines, until, event=1.0, every=0.02, changed=None):
         """Outputs and voltages at every so many seconds; the network is ``lines`` alone after the event [s].
 
         ``changed``: values that parameters take at the event."""
-        model, p, c = self.device.model, self.device.p.copy(), self.device.c
+        model, p = self.device.model, self.device.p.copy()
         names = [v.name for v in model.outputs]
-        before, after = self.network.seen(self.network.lines), self.network.seen(lines)
+        seen = self.network.seen(self.network.lines)
+        given, (rates, outputs) = _parts(seen[:2]), self._at_network(p)
         x = np.array(self.device.x, dtype=float)
         rows = []
 
-        def voltage(x, seen):
-            return self._voltage(x, seen, p)
-
-        def rate(x, seen):
-            return self._rates(x, voltage(x, seen)[0], p)
+        def rate(x):
+            return np.array(rates.values([x.tolist(), given])[0])
 
         for k in range(round(until / STEP) + 1):
-            seen = before if k < round(event / STEP) else after
-            for place, parameter in enumerate(model.parameters if k == round(event / STEP) else ()):
-                p[place] = (changed or {}).get(parameter.name, p[place])
+            if k == round(event / STEP):
+                seen = self.network.seen(lines)
+                given = _parts(seen[:2])
+                for name, value in (changed or {}).items():
+                    p[[v.name for v in model.parameters].index(name)] = value
+                    rates, outputs = self._at_network(p)
             if k % round(every / STEP) == 0:
-                v, current = voltage(x, seen)
-                out = np.array(model.outputs_function(x, [v.real, v.imag], p, c)).ravel()
-                buses = {bus: a + b * current for bus, (a, b) in seen[2].items()}
+                *out, re, im = outputs.values([x.tolist(), given])[0]
+                buses = {bus: a + b * complex(re, im) for bus, (a, b) in seen[2].items()}
                 rows.append((k * STEP, dict(zip(names, out, strict=True)), buses))
-            k1 = rate(x, seen)
-            k2 = rate(x + STEP / 2 * k1, seen)
-            k3 = rate(x + STEP / 2 * k2, seen)
-            k4 = rate(x + STEP * k3, seen)
+            k1 = rate(x)
+            k2 = rate(x + STEP / 2 * k1)
+            k3 = rate(x + STEP / 2 * k2)
+            k4 = rate(x + STEP * k3)
             x = x + STEP / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         return rows
+
+
+def _by_name(model, outputs):
+    return dict(zip([v.name for v in model.outputs], outputs[0], strict=True))
+
+
+def _product(a, b):
+    """The product of two complex numbers, each as its parts."""
+    return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
+
+
+def _parts(numbers):
+    return [part for number in numbers for part in (number.real, number.imag)]
