@@ -7,6 +7,7 @@ import pytest
 from fmus.grid.network import Line, Load, Network, Port, Shunt, Zip
 from fmus.grid.two_area import TWO_AREA
 from fmus.toolchain import dependencies, notes
+from fmus.toolchain.cache import cache_directory
 from orchestrator.cases.case import load_case
 from orchestrator.cases.scenario import catalogue_fmus
 from orchestrator.cases.scenario.catalogue_fmus import build_fmu, catalogue_fmu, plan_fmu
@@ -65,6 +66,16 @@ WANTED = [
 ]
 
 
+@pytest.fixture
+def empty_cache(tmp_path, monkeypatch):
+    """A cache without FMUs and notes, with the compiled libraries, which are not what is looked at."""
+    folder, libraries = tmp_path / "cache", cache_directory("libraries")
+    libraries.mkdir(parents=True, exist_ok=True)
+    folder.mkdir()
+    (folder / "libraries").symlink_to(libraries, target_is_directory=True)
+    monkeypatch.setenv("GFOR_COSIM_CACHE", str(folder))
+
+
 @pytest.fixture(autouse=True)
 def fresh():
     plan_fmu.cache_clear()
@@ -93,8 +104,8 @@ def test_each_argument_names_a_note_of_its_own(tmp_path, monkeypatch):
     assert len({notes.note_of(*one) for one in asked}) == len(WANTED)
 
 
-def test_a_note_of_an_fmu_that_is_gone_leads_to_its_building(tmp_path, monkeypatch):
-    monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path / "cache"))
+@pytest.mark.usefixtures("empty_cache")
+def test_a_note_of_an_fmu_that_is_gone_leads_to_its_building():
     first = build_fmu(plan_fmu("probe_a"))
     plan_fmu.cache_clear()
     assert plan_fmu("probe_a").description.guid == first.guid
@@ -109,9 +120,9 @@ def test_a_note_of_an_fmu_that_is_gone_leads_to_its_building(tmp_path, monkeypat
 @pytest.mark.parametrize(
     ("model", "network"), [("phasor_grid", NETWORK), ("grid", NETWORK), ("gfor", None)]
 )
-def test_a_plan_says_of_the_variables_what_the_fmu_says(model, network, tmp_path, monkeypatch):
+@pytest.mark.usefixtures("empty_cache")
+def test_a_plan_says_of_the_variables_what_the_fmu_says(model, network, monkeypatch):
     """All that a case is checked by: names, bounds, start values, states. Only dependencies need the equations."""
-    monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path / "cache"))
     planned = plan_fmu(model, network)
     assert not planned.is_there
     monkeypatch.setattr(
@@ -125,9 +136,9 @@ def test_a_plan_says_of_the_variables_what_the_fmu_says(model, network, tmp_path
     assert planned.description.guid != built.guid
 
 
-def test_a_long_description_is_not_read_again(tmp_path, monkeypatch):
+@pytest.mark.usefixtures("empty_cache")
+def test_a_long_description_is_not_read_again(monkeypatch):
     """Where dependencies are not listed it differs by its identity alone."""
-    monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(dependencies, "MOST", 0)
     with monkeypatch.context() as patch:
         patch.setattr(

@@ -1,6 +1,8 @@
 """A report in a dark window: what is read stands out from what is behind it, in pictures too; paper stays white."""
 
 import re
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ import pytest
 from orchestrator.output.report.html.charts import ChartCurve, legend, line_chart
 from orchestrator.output.report.html.elements import Figures, document, table
 from tests.support.chromium import running_browser
+from tests.support.once import computed_once
 
 LEAST_CONTRAST = 4.5
 """Of text, by the Web Content Accessibility Guidelines 2.1, level AA."""
@@ -37,7 +40,12 @@ def contrast(one, other):
 
 
 @pytest.fixture(scope="module")
-def texts(tmp_path_factory):
+def texts():
+    return texts_in_windows()
+
+
+@computed_once
+def texts_in_windows():
     """Colours of every text, and of what is behind it: in a light window, in a dark one, and on paper."""
     x = np.array([0.0, 1.0])
     chart = legend([("a", "#4d4d4d")]) + line_chart(
@@ -48,10 +56,10 @@ def texts(tmp_path_factory):
         '<p class="warning">warned</p><p class="bad">UNSTABLE</p><p class="good">stable</p>'
     )
     findings = '<div class="findings"><ul><li>found</li></ul></div>'
-    page = tmp_path_factory.mktemp("dark") / "page.html"
-    page.write_text(document("A page", "kind", findings, [("Part", content)]), encoding="utf-8")
     found = {}
-    with running_browser() as browser:
+    with TemporaryDirectory() as folder, running_browser() as browser:
+        page = Path(folder) / "page.html"
+        page.write_text(document("A page", "kind", findings, [("Part", content)]), encoding="utf-8")
         view = browser.new_page()
         view.goto(page.as_uri())
         for name, media in (

@@ -12,6 +12,7 @@ import pytest
 from orchestrator.face.cli import main
 from orchestrator.output.report.column_table import Column, ColumnTable
 from orchestrator.output.report.short_texts import kinds_of
+from tests.support.once import made_once
 from tests.support.printed import eigenvalue, in_markdown, on_page, on_terminal, value
 
 SCENARIOS = ["--scenario", "base", "--scenario", "pod_p"]
@@ -21,13 +22,30 @@ VALIDATION = ROOT / ".docs" / "validation"
 pytestmark = pytest.mark.usefixtures("undrawn")
 
 
-@pytest.fixture(scope="module")
-def studied(tmp_path_factory):
-    """A run of two scenarios: its folder, and what it printed."""
-    folder, printed = tmp_path_factory.mktemp("tables"), StringIO()
+def printed_by(*words):
+    """What a command printed that ended well."""
+    printed = StringIO()
     with redirect_stdout(printed):
-        assert main(["run", "two_area", *SCENARIOS, "--stop", "5", "--out", str(folder)]) == 0
-    return folder, printed.getvalue()
+        assert main([*map(str, words)]) == 0
+    return printed.getvalue()
+
+
+def run_once(name, *words, report=False):
+    """A run of two scenarios: its folder, and what it printed; the report of all in the folder where it is wanted."""
+
+    def run(place):
+        command = ["run", "two_area", *SCENARIOS, "--workers", "1", *words]
+        (place / "printed.txt").write_text(printed_by(*command, "--out", place / "run"), "utf-8")
+        if report:
+            printed_by("report", place / "run")
+
+    place = made_once(name, run)
+    return place / "run", (place / "printed.txt").read_text("utf-8")
+
+
+@pytest.fixture(scope="module")
+def studied():
+    return run_once("tables", "--stop", "5", report=True)
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +62,6 @@ def printed(studied):
 
 @pytest.fixture(scope="module")
 def page(studied):
-    assert main(["report", str(studied[0])]) == 0
     return on_page((studied[0] / "report.html").read_text(encoding="utf-8"))
 
 
@@ -102,14 +119,11 @@ def test_one_line_tells_how_a_run_was_computed(studied, summary):
 
 
 @pytest.fixture(scope="module")
-def detailed(tmp_path_factory):
+def detailed():
     """A short run of the same scenarios with details: its folder, and its tables."""
-    folder, printed = tmp_path_factory.mktemp("details"), StringIO()
-    words = ["run", "two_area", *SCENARIOS, "--stop", "1", "--details", "--no-csv"]
-    with redirect_stdout(printed):
-        assert main([*words, "--out", str(folder)]) == 0
-    assert "How it was computed" not in printed.getvalue()
-    return folder, on_terminal(printed.getvalue())
+    folder, printed = run_once("details", "--stop", "1", "--details", "--no-csv")
+    assert "How it was computed" not in printed
+    return folder, on_terminal(printed)
 
 
 def test_the_details_of_a_run_have_its_steady_state(detailed):
