@@ -12,6 +12,9 @@ NOISE = {"v_pu": 2e-5, "angle_deg": 1e-3, "p_mw": 0.6, "q_mvar": 0.6}
 """Standard deviations of good instruments, those of the powers as 4e-4 of the rating."""
 
 
+RECORDED = ["grid.bus_2.v_*", "grid.bus_3.v_*", "gfor.i_*"]
+"""What recordings are made of: the voltages of the plant's bus and of its neighbour, and the plant's current."""
+
 WHOLE = 6.0  # length of the run of which shorter ones without changes are the begin [s]
 
 
@@ -22,11 +25,14 @@ def run(scenario="pod_p", stop=WHOLE, scale=EVENT["scale"], **values):
     return ran.sel(time=slice(0.0, stop + INTERVAL / 2))
 
 
+SOLVER = {"record_interval": INTERVAL, "record_filter": "low-pass", "record": RECORDED}
+
+
 @computed_once
 def _ran(scenario, stop, scale, **values):
     case = gfor.load("two_area").with_(
         events=[EVENT | {"scale": scale}],
-        solver={"record_interval": INTERVAL, "record_filter": "low-pass"},
+        solver=SOLVER,
     )
     set_to = {name.replace("__", "."): value for name, value in values.items()}
     return case.scenario(scenario, set_to).run(stop=stop).dataset

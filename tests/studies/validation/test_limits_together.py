@@ -11,7 +11,7 @@ from orchestrator.studies.validation.cause_pairs import pair_of_limits
 from orchestrator.studies.validation.causes import CauseKind, Explanation
 from orchestrator.studies.validation.unreached import unreached_limits
 from orchestrator.studies.validation.words import explanation_sentence
-from tests.studies.validation.recordings import table, with_noise
+from tests.studies.validation.recordings import SOLVER, table, with_noise
 
 ON = {"pod_p.enabled": True}
 Q, D = "voltage_control.i_q_max", "voltage_control.i_d_max"
@@ -28,9 +28,7 @@ FAULT = {
 @cache
 def bench_of(**limits):
     """A model with limits of 1.1 pu beside a plant with others, in a fault at which it reaches both."""
-    case = gfor_in_python.load("two_area").with_(
-        events=[FAULT], solver={"record_interval": "1 ms", "record_filter": "low-pass"}
-    )
+    case = gfor_in_python.load("two_area").with_(events=[FAULT], solver=SOLVER)
     values = {f"gfor.voltage_control.{name}": value for name, value in limits.items()}
     frame = with_noise(table(case.scenario("pod_p", values).run(stop=1.6).dataset))
     found = gfor_in_python.validate("gfor", frame.set_index("time"), values=ON, step="500 us")

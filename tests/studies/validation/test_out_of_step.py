@@ -10,7 +10,7 @@ from orchestrator.studies.validation.limits import EXAMPLE
 from orchestrator.studies.validation.out_of_step import slip
 from orchestrator.studies.validation.record import Recording
 from orchestrator.studies.validation.windows import Windows
-from tests.studies.validation.recordings import table, with_noise
+from tests.studies.validation.recordings import SOLVER, table, with_noise
 
 STEP = "200 us"
 PLANT = {"pod_p.enabled": True, "pod_p.K": 60.0}
@@ -70,7 +70,7 @@ def test_a_model_without_the_plants_limit_makes_no_minutes_of_seconds():
     fault = {"time": 1.0, "component": "grid", "type": "bus_fault", "bus": "bus_2"}
     case = gfor_in_python.load("two_area").with_(
         events=[fault | {"X": 0.004, "duration": 0.1}],
-        solver={"record_interval": "1 ms", "record_filter": "low-pass"},
+        solver=SOLVER,
     )
     limited = {"gfor.current_limit.kind": 3, "gfor.current_limit.I_max": 1.002}
     frame = with_noise(table(case.scenario("pod_p", limited).run(stop=4.0).dataset))

@@ -13,7 +13,7 @@ from orchestrator.studies.validation.limits import EXAMPLE
 from orchestrator.studies.validation.questions import QuestionKind
 from orchestrator.studies.validation.record import PortBases, read_recording
 from orchestrator.studies.validation.words import sentence
-from tests.studies.validation.recordings import of_pmu, run, table, waves, with_noise
+from tests.studies.validation.recordings import SOLVER, of_pmu, run, table, waves, with_noise
 from tests.support.late import LateLibrary
 
 scipy_signal = LateLibrary("scipy.signal")
@@ -312,9 +312,7 @@ def test_a_block_that_is_stored_twice_is_told_with_its_times(good):
 def test_a_plant_that_falls_out_of_step_itself_leaves_no_verdict_on_its_own_model():
     fault = {"time": 1.0, "component": "grid", "type": "bus_fault", "bus": "bus_2"}
     deep = fault | {"X": 0.002, "duration": 0.25}
-    case = gfor_in_python.load("two_area").with_(
-        events=[deep], solver={"record_interval": "1 ms", "record_filter": "low-pass"}
-    )
+    case = gfor_in_python.load("two_area").with_(events=[deep], solver=SOLVER)
     frame = with_noise(table(case.scenario("pod_p").run(stop=3.0).dataset))
     found = gfor_in_python.validate("gfor", frame.set_index("time"), values=ON, limits=EXAMPLE)
     (question,) = [
