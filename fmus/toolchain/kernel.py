@@ -141,7 +141,8 @@ def lanes_source(model: Model) -> str:
         lanes_function(apart.outputs, "outputs_lanes"),
         "#endif",
     ]
-    return "\n".join([(_C / "lanes.h").read_text(encoding="utf-8"), *parts])
+    headers = [(_C / name).read_text(encoding="utf-8") for name in ("registers.h", "lanes.h")]
+    return "\n".join([*headers, *parts])
 
 
 def _tables(lists: Mapping[str, list[int]]) -> str:

@@ -1,9 +1,8 @@
 /* Numbers of several instances side by side, one in each lane, and the operations of equations on them: the same
    roundings as one by one, because a processor rounds each lane by itself and functions of the C library are called lane
    by lane. Compilers without Clang's functions of vectors leave it out, and instances step one by one. */
-#if defined __clang__ && (defined __x86_64__ || defined _M_X64)
+#ifdef ASKS_FOR_REGISTERS
 #define STACKED
-#include <cpuid.h>
 
 enum { LANES = 8 };
 typedef double lanes __attribute__((vector_size(LANES * sizeof(double))));

@@ -102,15 +102,8 @@ IN_ROW void solve_wanted(double *w) {
 
 /* A loop over rows also for a processor with wider instructions, which take fewer of them: without contraction, so that
    each rounds as it does elsewhere. */
-#if defined __clang__ && (defined __x86_64__ || defined _M_X64)
-#include <cpuid.h>
-static int is_wide(void) {
-    enum { OSXSAVE = 1 << 27, AVX2 = 1 << 5, YMM = 0x06 };
-    unsigned a, b, c, d, kept, high;
-    if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & OSXSAVE)) return 0;
-    __asm__ volatile("xgetbv" : "=a"(kept), "=d"(high) : "c"(0));
-    return __get_cpuid_count(7, 0, &a, &b, &c, &d) && b & AVX2 && (kept & YMM) == YMM;
-}
+#include "registers.h"
+#ifdef ASKS_FOR_REGISTERS
 #define ROWS(name, loop)                                                                                               \
     __attribute__((target("avx2"))) static void name##_wide(double *w) { loop(w); }                                    \
     static void name(double *w) {                                                                                      \
@@ -118,7 +111,6 @@ static int is_wide(void) {
         else loop(w);                                                                                                  \
     }
 #else
-static int is_wide(void) { return 0; }
 #define ROWS(name, loop)                                                                                               \
     static void name(double *w) { loop(w); }
 #endif

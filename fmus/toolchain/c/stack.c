@@ -96,15 +96,10 @@ FOR_REGISTERS(avx2)
 
 typedef int (*side_by_side)(struct instance *const *, const struct beside *);
 
-/* By what processor and system offer; NULL without wide registers. */
-static side_by_side widest(void) {
-    enum { OSXSAVE = 1 << 27, AVX2 = 1 << 5, AVX512F = 1 << 16, YMM = 0x06, ZMM = 0xe6 };
-    unsigned a, b, c, d, kept, high;
-    if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & OSXSAVE)) return NULL;
-    __asm__ volatile("xgetbv" : "=a"(kept), "=d"(high) : "c"(0));
-    if (!__get_cpuid_count(7, 0, &a, &b, &c, &d)) return NULL;
-    if (b & AVX512F && (kept & ZMM) == ZMM) return step_avx512f;
-    return b & AVX2 && (kept & YMM) == YMM ? step_avx2 : NULL;
+/* NULL without wide registers. */
+static side_by_side step_of_widest(void) {
+    static const side_by_side STEP[] = {[NARROW] = NULL, [AVX2] = step_avx2, [AVX512F] = step_avx512f};
+    return STEP[widest()];
 }
 
 /* Whether an instance can step beside the first: its next step is as its last one was, with the same parameters, which
@@ -128,7 +123,7 @@ static int step_block(struct instance *const *s, size_t n, double time, double s
 #else
 enum { LANES = 1 };
 typedef void *side_by_side;
-static side_by_side widest(void) { return NULL; }
+static side_by_side step_of_widest(void) { return NULL; }
 static int step_block(struct instance *const *s, size_t n, double time, double step_size, side_by_side step) {
     return (void)s, (void)n, (void)time, (void)step_size, (void)step, 0;
 }
@@ -139,7 +134,7 @@ EXPORT int gfor_step_stack(struct instance *const *s, size_t n, double time, dou
     static side_by_side known;
     static int looked;
     int worst = OK;
-    if (!looked) known = widest(), looked = 1;
+    if (!looked) known = step_of_widest(), looked = 1;
     for (size_t first = 0; first < n; first += LANES) {
         const size_t last = first + LANES < n ? first + LANES : n;
         const int done = step_block(s + first, last - first, time, step_size, known);

@@ -275,7 +275,7 @@ TAPE int64_t workspace_size(const void *tape) {
 TAPE void begin(const void *tape, double *w) {
     memset(w, 0, (size_t)workspace_size(tape) * sizeof *w);
     lay_out(tape, OF(w));
-    OF(w)->wide = is_wide();
+    OF(w)->wide = widest() >= AVX2;
     if (NB) place_reach(w, (int32_t *)(w + REACH)), find_reach(w);
     memcpy(SLOT + AT_GH + 1, (const struct header *)tape + 1, OF(w)->size.numbers * sizeof *w);
 }
