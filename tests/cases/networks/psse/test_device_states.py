@@ -216,3 +216,11 @@ def test_voltage_source_converters_lose_what_psse_says(r, power, volts, losses, 
     assert vsc.powers()[0] == power
     assert vsc.powers()[1] == pytest.approx(wanted, abs=0.01)
     assert fed(vsc, {1: 1.0, 2: 1.0})[0].imag == pytest.approx(power * 0.328684, rel=1e-5)
+
+
+def test_one_bridge_is_known_where_the_record_has_its_transformer():
+    assert bridges(1, 0.1, 0.69, 0.5, 1.0, 10, 40).is_known
+    assert not any(
+        bridges(count, 0.1, base, ratio, 1.0, 10, 40).is_known
+        for count, base, ratio in ((0, 0.69, 0.5), (1, 0.0, 0.5), (1, 0.69, 0.0))
+    )
