@@ -36,7 +36,7 @@ _STANDS = 1e-10
 
 @dataclass(frozen=True)
 class ShiftedSolver:
-    """Solves (A − σI)·x = b with ``solve`` and (A − σI)ᴴ·x = b with ``solve_adjoint``."""
+    """Solves (A − σI)·x = b with ``solve`` and (A − σI)ᴴ·x = b with ``solve_adjoint``; b is (n,) or (n, c)."""
 
     solve: Callable[[Vector], Vector]
     solve_adjoint: Callable[[Vector], Vector]
@@ -177,7 +177,7 @@ class LinearModel:
         kind = whole.dtype
 
         def solve(b: Vector, transposed: str = "N") -> Any:
-            right = np.zeros(n + m, dtype=kind)
+            right = np.zeros((n + m, *b.shape[1:]), dtype=kind)
             right[:n] = b
             return factors.solve(right, transposed)[:n]
 

@@ -46,7 +46,7 @@ class ChangedSpectra:
     Raises `AnalysisError` where the two have other states or wires."""
 
     def __init__(self, one: LinearModel, other: LinearModel) -> None:
-        self._model = _without(one, _equations_of(one, _Change.between(one, other)))
+        self._model = _without(one, _equations_of(one, Change.between(one, other)))
         with one_thread():
             self._coordinates = RealSchur(self._model.A).coordinates()
         self._ends: _Ends | None = None
@@ -55,7 +55,7 @@ class ChangedSpectra:
         """The eigenvalues of another one of the models.
 
         Raises `AnalysisError` where the rest's modes do not give its answers."""
-        change = _Change.between(self._model, model)
+        change = Change.between(self._model, model)
         with one_thread():
             if self._ends is None or not self._ends.hold(change):
                 self._ends = self._ends_of(change, self._ends)
@@ -70,13 +70,13 @@ class ChangedSpectra:
         )
         return Eigenpair(pair.eigenvalue, left.conj(), right)
 
-    def _ends_of(self, change: "_Change", before: "_Ends | None") -> "_Ends":
+    def _ends_of(self, change: "Change", before: "_Ends | None") -> "_Ends":
         """The ends of all changes so far, in the coordinates of the modes, once they are held against the equations."""
         equations, read = change.equations, change.read
         if before is not None:
             equations = np.union1d(equations, before.equations)
             read = np.union1d(read, before.read)
-        B, C, D = self._in_states(equations, read)
+        B, C, D = ends_in_states(self._model, equations, read)
         try:
             found = _Ends(
                 equations, read, self._coordinates.columns(B), C=self._coordinates.rows(C), D=D
@@ -85,23 +85,6 @@ class ChangedSpectra:
             raise AnalysisError("modes of the rest of the system are defective") from error
         self._hold_against_equations(found, B, C)
         return found
-
-    def _in_states(self, equations: Places, read: Places) -> tuple[Matrix, Matrix, Matrix]:
-        """B, C and D from what is added to equations, those of states first, to states and wires, read likewise."""
-        model = self._model
-        n, m = model.G.shape
-        added = np.zeros((n + m, len(equations)))
-        added[equations, np.arange(len(equations))] = 1.0
-        taken = np.zeros((n + m, len(read)))
-        taken[read, np.arange(len(read))] = 1.0
-        wires = model.settle(added[n:]) if m else added[n:]
-        B = added[:n] + model.G @ wires
-        C, D = taken[:n].T, np.zeros((len(read), len(equations)))
-        if m:
-            transposed = spla.splu(sp.csc_array((sp.eye_array(m) - model.K).T))
-            C = C + (model.H.T @ transposed.solve(taken[n:])).T
-            D = taken[n:].T @ wires
-        return np.asarray(B), np.asarray(C), np.asarray(D)
 
     def _hold_against_equations(self, ends: "_Ends", B: Matrix, C: Matrix) -> None:
         step = self._model.step_size
@@ -120,8 +103,29 @@ class ChangedSpectra:
                 )
 
 
+def ends_in_states(
+    model: LinearModel, equations: Places, read: Places
+) -> tuple[Matrix, Matrix, Matrix]:
+    """B, C and D from what is added to equations, those of states first, to states and wires, read likewise.
+
+    What is read is C·z + D·a where a is added to the equations; B·a is what that adds to the states' own."""
+    n, m = model.G.shape
+    added = np.zeros((n + m, len(equations)))
+    added[equations, np.arange(len(equations))] = 1.0
+    taken = np.zeros((n + m, len(read)))
+    taken[read, np.arange(len(read))] = 1.0
+    wires = model.settle(added[n:]) if m else added[n:]
+    B = added[:n] + model.G @ wires
+    C, D = taken[:n].T, np.zeros((len(read), len(equations)))
+    if m:
+        transposed = spla.splu(sp.csc_array((sp.eye_array(m) - model.K).T))
+        C = C + (model.H.T @ transposed.solve(taken[n:])).T
+        D = taken[n:].T @ wires
+    return np.asarray(B), np.asarray(C), np.asarray(D)
+
+
 @dataclass(frozen=True)
-class _Change:
+class Change:
     """Additions to some equations of states and wires (z⁺; w), by what they read of (z; w)."""
 
     equations: Places
@@ -129,7 +133,7 @@ class _Change:
     added: Matrix
 
     @classmethod
-    def between(cls, one: LinearModel, other: LinearModel) -> "_Change":
+    def between(cls, one: LinearModel, other: LinearModel) -> "Change":
         if one.names != other.names or one.K.shape != other.K.shape:
             raise AnalysisError("the models have other states or wires")
         pairs = [(other.F, one.F), (other.G, one.G), (other.H, one.H), (other.K, one.K)]
@@ -154,13 +158,13 @@ class _Ends:
     C: Vector
     D: Matrix
 
-    def hold(self, change: _Change) -> bool:
+    def hold(self, change: Change) -> bool:
         return bool(
             np.isin(change.equations, self.equations).all()
             and np.isin(change.read, self.read).all()
         )
 
-    def between(self, change: _Change) -> Matrix:
+    def between(self, change: Change) -> Matrix:
         """S of a change: what is added depends on what is read, which depends on what is added."""
         added = np.zeros((len(self.equations), len(self.read)))
         rows = np.searchsorted(self.equations, change.equations)
@@ -168,7 +172,7 @@ class _Ends:
         return np.asarray(np.linalg.solve(np.eye(len(added)) - added @ self.D, added))
 
 
-def _equations_of(model: LinearModel, change: _Change) -> Places:
+def _equations_of(model: LinearModel, change: Change) -> Places:
     """All equations of the components of which some change: of states first, then of wires."""
     names = [*model.names, *model.wires]
     components = {_component(names[k]) for k in change.equations.tolist() if k < len(names)}
@@ -201,7 +205,7 @@ class ChangedSpectrum:
     ``values``: eigenvalues [rad/s]."""
 
     def __init__(
-        self, of_rest: Complex, ends: _Ends, change: _Change, step_size: float | None
+        self, of_rest: Complex, ends: _Ends, change: Change, step_size: float | None
     ) -> None:
         self._rest, self._step = of_rest, step_size
         self._B, self._C = ends.B, ends.between(change) @ ends.C

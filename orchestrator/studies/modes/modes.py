@@ -16,6 +16,7 @@ import numpy as np
 from orchestrator.cases.events.fault_tables import component_faults
 from orchestrator.cases.form.schema import ReferenceModeTable
 from orchestrator.cases.networks.areas import areas_of
+from orchestrator.cases.questions.dead_bands import resting_loops
 from orchestrator.cases.scenario.facts import facts_of
 from orchestrator.cases.scenario.flow_figures import power_flow_json
 from orchestrator.cases.scenario.prepare import PreparedScenario
@@ -72,6 +73,14 @@ BlackBoxes = Callable[[Master], Mapping[str, ComponentLinearization]]
 
 
 @dataclass(frozen=True)
+class PortValues:
+    """Coupled inputs of a component with their values at the operating point, and names of its coupled outputs."""
+
+    inputs: Mapping[str, float]
+    outputs: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class ModesResult:
     prepared: PreparedScenario
     operating_point: OperatingPoint
@@ -98,6 +107,8 @@ class ModesResult:
     misfits: Mapping[str, list[Misfit]] = field(default_factory=dict)
     # damping ratio below which modes were looked for; None where all were
     critical: float | None = None
+    # the ports at the operating point of components with a loop that rests within its dead band, by component
+    resting: Mapping[str, PortValues] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -478,7 +489,18 @@ class Linearised:
             fit_errors=fit_errors,
             unnamed=naming.reasons,
             critical=self._critical,
+            resting=self._ports_at_rest(),
         )
+
+    def _ports_at_rest(self) -> dict[str, PortValues]:
+        found = {}
+        for loop in resting_loops(self._prepared.system.components):
+            exchange = self._master.exchanges.get(loop.component)
+            if exchange is not None:
+                values = exchange.inputs.read().tolist()
+                inputs = dict(zip(exchange.inputs.names, values, strict=True))
+                found[loop.component] = PortValues(inputs, exchange.outputs.names)
+        return found
 
 
 def _too_large(states: int, frequency_range: tuple[float, float]) -> str:
