@@ -65,7 +65,7 @@ def _alone(
 
 
 class _Additions:
-    """What is added to the equations of a continuous model, of states first, then of wires."""
+    """Additions to the equations of a continuous model, of states first, then of wires."""
 
     def __init__(self, model: LinearModel, prepared: PreparedScenario) -> None:
         self._model = model
