@@ -183,6 +183,22 @@ class Blocks:
         other.components = other._anew(master, [name])
         return other
 
+    def connected_alone(self) -> "Blocks":
+        """The same blocks without ``inputs`` and ``outputs``."""
+        other = copy.copy(self)
+        other.inputs, other.outputs = (), ()
+        other.components = dict(self.components)
+        other.sources = dict(self.sources)
+        for name in {full.partition(".")[0] for full in (*self.inputs, *self.outputs)}:
+            component = self.components[name]
+            count = len(component.inputs) - len(self._driven[name])
+            other.components[name] = component.connected_alone(count)
+            other.sources[name] = self.sources[name][:count]
+        other._idle = dict(self._idle)
+        other._driven = {name: [] for name in self.components}
+        other._observed = {name: [] for name in self.components}
+        return other
+
     def check_made_for(self, schedule: Schedule | None) -> None:
         """Refuse blocks whose components were given another communication step than a schedule's; None: no step."""
         told = schedule is not None and not schedule.is_second_order

@@ -3,7 +3,7 @@
 Where an FMU gives directional derivatives, these give the same model in an independent way."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -71,6 +71,27 @@ class ComponentLinearization:
     narrow: Mapping[str, float] = field(default_factory=dict)
     # states and inputs for which no two sizes agreed, or whose differences upwards and downwards deviate
     doubtful: tuple[str, ...] = ()
+
+    def connected_alone(self, count: int) -> "ComponentLinearization":
+        """The same with the first inputs alone, as many as are connected, and without the requested outputs."""
+        own = {*self.states, *self.inputs[:count]}
+        narrow = {name: size for name, size in self.narrow.items() if name in own}
+        variants = tuple(
+            one._replace(B=one.B[:, :count], D=one.D[:, :count]) for one in self.variants
+        )
+        return replace(
+            self,
+            inputs=self.inputs[:count],
+            B=self.B[:, :count],
+            D=self.D[:, :count],
+            observed=(),
+            C_o=self.C_o[:0],
+            D_o=self.D_o[:0, :count],
+            B_c=None if self.B_c is None else self.B_c[:, :count],
+            variants=variants,
+            narrow=narrow,
+            doubtful=tuple(name for name in self.doubtful if name in own),
+        )
 
 
 def linearize_component(

@@ -130,13 +130,13 @@ class LinearModel:
         )
 
     @cached_property
-    def settle(self) -> Callable[[Any], Any]:
-        """W = (I − K)⁻¹·b."""
+    def settle(self) -> Callable[..., Any]:
+        """W = (I − K)⁻¹·b; with "T" behind b, by the transpose."""
         m = self.K.shape[0]
         if not m:
-            return lambda b: b
+            return lambda b, _="N": b
         factors = spla.splu(sp.csc_array(sp.eye_array(m, format="csr") - self.K))
-        solve: Callable[[Any], Any] = factors.solve
+        solve: Callable[..., Any] = factors.solve
         return solve
 
     def __getstate__(self) -> dict[str, Any]:

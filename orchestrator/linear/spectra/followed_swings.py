@@ -4,6 +4,7 @@ All eigenvalues of a large system take several times as long. What is searched a
 damped less than `LITTLE`; those a little beyond are followed as well, so that what enters is known already."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -45,8 +46,26 @@ def swings_among(modes: Sequence[Mode], model: LinearModel) -> RefinedModes:
     return RefinedModes(values, left, right, settled=True)
 
 
-def follow_swings(model: LinearModel, before: RefinedModes) -> RefinedModes | None:
-    """The swings of a model from those of a similar one; None where these do not settle, or are not all."""
+def least_damped_swings(swings: RefinedModes, count: int) -> tuple[RefinedModes, float]:
+    """So many of the swings, and the damping ratio below which none is missed where they are followed."""
+    dampings = np.array([damping_ratio(value) for value in swings.values.tolist()])
+    if len(dampings) <= count:
+        return swings, LITTLE
+    first = np.argsort(dampings, kind="stable")[:count]
+    some = replace(
+        swings,
+        values=swings.values[first],
+        left=swings.left[:, first],
+        right=swings.right[:, first],
+    )
+    return some, float(dampings[first[-1]]) / _BEYOND
+
+
+def follow_swings(
+    model: LinearModel, before: RefinedModes, little: float = LITTLE
+) -> RefinedModes | None:
+    """The swings of a model from those of a similar one; None where these do not settle, or are not all that have less
+    than a damping ratio ``little``."""
     if not len(before.values):
         return None
     low, high = (2 * np.pi * hertz for hertz in ELECTROMECHANICAL_HZ)
@@ -54,19 +73,19 @@ def follow_swings(model: LinearModel, before: RefinedModes) -> RefinedModes | No
         with one_thread():
             equations = ShiftedEquations(model)
             found = refine(model, equations, before.values, before.left, before.right)
-            if not found.settled or misses_modes(equations, found, low, high, LITTLE):
+            if not found.settled or misses_modes(equations, found, low, high, little):
                 return None
     except (AnalysisError, np.linalg.LinAlgError):
         return None
     return found
 
 
-def weakest_swing(swings: RefinedModes) -> complex | None:
-    """The least damped one from 0.1 to 2 Hz [rad/s]; None if none of these is damped less than `LITTLE`."""
+def weakest_swing(swings: RefinedModes, little: float = LITTLE) -> complex | None:
+    """The least damped one from 0.1 to 2 Hz [rad/s]; None if none of these is damped less than ``little``."""
     low, high = (2 * np.pi * hertz for hertz in ELECTROMECHANICAL_HZ)
     held = [
         value
         for value in swings.values.tolist()
-        if low <= value.imag <= high and damping_ratio(value) < LITTLE
+        if low <= value.imag <= high and damping_ratio(value) < little
     ]
     return min(held, key=damping_ratio, default=None)

@@ -246,7 +246,7 @@ def _with_pod(
     predicted = shift(trial)
     coupled = loop.place(start, trial.gain, trial.filters).eigenvalue - start.eigenvalue
     reached = loop.place(start, tuned.gain, tuned.filters)
-    least = least_of(looks.all_values(tuned), frequency_range, reached.eigenvalue)
+    least = least_of(looks.known_values(tuned), frequency_range, reached.eigenvalue)
     return Confirmation(
         bus,
         predicted,

@@ -3,7 +3,9 @@
 Of a system with few states all eigenvalues are computed with each setting. In a larger one they come from one Schur
 form of the system without the controller's component, and are computed from the whole matrix with the setting that is
 chosen. In a very large one the swings are followed from setting to setting, which says what grows among them, and
-nothing of what grows elsewhere: all eigenvalues are computed with those settings that decide."""
+nothing of what grows elsewhere: all eigenvalues are computed with those settings that decide. Of a system too large
+for these, the least damped swings alone are followed, and modes of little damping and growth are searched with the
+settings that decide."""
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
@@ -17,12 +19,16 @@ from orchestrator.core.threads import one_thread
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.changed_spectra import ChangedSpectra, ChangedSpectrum
 from orchestrator.linear.spectra.continuation import Eigenpair, follow_along
+from orchestrator.linear.spectra.critical_modes import find_critical_modes
 from orchestrator.linear.spectra.followed_swings import (
+    LITTLE,
     follow_swings,
+    least_damped_swings,
     search_swings,
     swings_among,
     weakest_swing,
 )
+from orchestrator.linear.spectra.growth_search import find_growing_modes
 from orchestrator.linear.spectra.mode_refinement import RefinedModes
 from orchestrator.linear.spectra.modes import (
     ELECTROMECHANICAL_HZ,
@@ -34,7 +40,7 @@ from orchestrator.linear.spectra.modes import (
     least_damped_first,
     make_mode,
 )
-from orchestrator.linear.spectra.stability import fastest_growth
+from orchestrator.linear.spectra.stability import WHOLE, fastest_growth
 from orchestrator.studies.pod_design.closed_loop import Placed, PodLoop, PodSetting
 from orchestrator.studies.pod_design.guard import weakest_and_growing
 from orchestrator.studies.pod_design.lead_lag import NO_COMPENSATION
@@ -48,6 +54,12 @@ MOST_WHOLE = 3500
 LEAST_CHANGED = 1_000
 """From this number of states on, one Schur form serves all settings; with fewer, all eigenvalues take half a second at
 most. With 3,049 states the form takes 9.2 s of processor time, and each setting 0.4 s."""
+
+FOLLOWED = 24
+"""Swings that are followed in a system too large for all eigenvalues, the least damped: 285 modes of 11,330 states do
+not settle in 109 s. Where another one falls below them, or all rise above the last one, modes are searched."""
+
+_WIDER = (LITTLE, 0.9)  # damping ratios up to which modes are searched, one after the other
 
 _NEIGHBOURS = 8  # pairs among which a mode is recognised
 _ALIKE = 1e-6  # the least damped mode in both ways differs by at most this part of its size
@@ -141,6 +153,10 @@ class LeastDamping:
             PodSetting, Spectrum
         ] = {}  # with the swings, of settings that were proved
         self._form = _OneForm(loop, self._forget)
+        self._little = LITTLE
+        # of a system too large for all eigenvalues, by setting: what grows [rad/s], and modes of little damping
+        self._growing: dict[PodSetting, NDArray[np.complex128]] = {}
+        self._searched: dict[PodSetting, list[Mode]] = {}
 
     def of(self, setting: PodSetting) -> float:
         """The least damping ratio, `GROWS` where something is seen to grow.
@@ -149,7 +165,7 @@ class LeastDamping:
         if setting not in self._found:
             model = self._loop.model(setting)
             swings = None if len(model.names) <= MOST_WHOLE else self._followed(setting)
-            weakest = None if swings is None else weakest_swing(swings)
+            weakest = None if swings is None else weakest_swing(swings, self._little)
             if swings is None or weakest is None:
                 return self.surely(setting)
             grows = fastest_growth(swings.values, step_map=model.step_size is not None) is not None
@@ -163,7 +179,9 @@ class LeastDamping:
         return self._found[setting]
 
     def weakest(self, setting: PodSetting) -> complex | None:
-        """The least damped mode [rad/s], by all eigenvalues; None where something grows."""
+        """The least damped mode [rad/s], by all eigenvalues or a search for it; None where something grows."""
+        if self._is_vast:
+            return None if self._grows(setting) else _least_of(self._found_by_search(setting))
         if setting not in self._whole:
             by_form = self._form.at(setting)
             if by_form is not None:
@@ -177,7 +195,7 @@ class LeastDamping:
 
     def is_sure(self, setting: PodSetting) -> bool:
         """Tell whether growth at any frequency is known, or that something grows."""
-        known = setting in self._whole or setting in self._form
+        known = setting in self._whole or setting in self._form or setting in self._growing
         return known or self._found.get(setting) == GROWS
 
     def is_proved(self, setting: PodSetting) -> bool:
@@ -220,8 +238,18 @@ class LeastDamping:
                     self._whole[setting] = eigenvalues(model)
         return self._whole[setting]
 
+    def known_values(self, setting: PodSetting) -> NDArray[np.complex128]:
+        """All eigenvalues [rad/s]; of a system too large for them those of little damping."""
+        if not self._is_vast:
+            return self.all_values(setting)
+        found = [mode.eigenvalue for mode in self._found_by_search(setting)]
+        return np.array([*found, *self._growing.get(setting, ())], dtype=complex)
+
     def is_stable(self, setting: PodSetting) -> bool | None:
         """The verdict on the whole system, at any frequency; None where it is not known."""
+        if self._is_vast:
+            modes = self._found_by_search(setting)
+            return self._loop.examine(setting, modes=modes).stability.stable
         swings = self._swings.get(setting)
         if swings is None:
             spectrum = self._spectra.get(setting)
@@ -235,16 +263,46 @@ class LeastDamping:
         if setting not in self._swings:
             before = self._nearest(setting)
             model = self._loop.model(setting)
-            found = None if before is None else follow_swings(model, before)
+            found = None if before is None else follow_swings(model, before, self._little)
             if found is None and not setting.gain:  # from here all others are followed
                 found = _searched(model)
             self._swings[setting] = found
         return self._swings[setting]
 
+    @property
+    def _is_vast(self) -> bool:
+        """Tell if the system is too large for all its eigenvalues."""
+        return len(self._loop.model(PodSetting(0.0, NO_COMPENSATION)).names) > WHOLE
+
+    def _grows(self, setting: PodSetting) -> bool:
+        """Tell by a search of the right half-plane if something grows at any frequency."""
+        model = self._loop.model(setting)
+        if setting not in self._growing:
+            found = find_growing_modes(model).eigenvalues
+            self._growing[setting] = np.array(found, dtype=complex)
+        is_map = model.step_size is not None
+        return fastest_growth(self._growing[setting], step_map=is_map) is not None
+
+    def _found_by_search(self, setting: PodSetting) -> list[Mode]:
+        """Modes of little damping in the whole range."""
+        for damping in _WIDER:
+            if not self._searched.get(setting):
+                model = self._loop.model(setting)
+                self._searched[setting] = find_critical_modes(model, *self._within, damping)
+        return self._searched[setting]
+
+    def _start(self, model: LinearModel) -> RefinedModes:
+        """The known swings; of a system too large for all eigenvalues the least damped of them."""
+        every = swings_among(self._known, model)
+        if not self._is_vast:
+            return every
+        some, self._little = least_damped_swings(every, FOLLOWED)
+        return some
+
     def _nearest(self, setting: PodSetting) -> RefinedModes | None:
         """Return what a setting's swings are followed from; None where they were lost at a smaller gain already."""
         if not setting.gain:
-            return swings_among(self._known, self._loop.model(setting)) if self._known else None
+            return self._start(self._loop.model(setting)) if self._known else None
         alike = [
             one
             for one in self._swings
@@ -262,6 +320,12 @@ def _in_range(swings: RefinedModes, names: tuple[str, ...]) -> list[Mode]:
     )
     low, high = ELECTROMECHANICAL_HZ
     return least_damped_first(mode for mode in every if low <= mode.frequency_hz <= high)
+
+
+def _least_of(modes: Sequence[Mode]) -> complex:
+    """The least damped of some modes [rad/s]; −1 if there is none, as `weakest_and_growing` has it."""
+    found = [mode.eigenvalue for mode in modes]
+    return min(found, key=damping_ratio, default=complex(-1))
 
 
 def _searched(model: LinearModel) -> RefinedModes | None:

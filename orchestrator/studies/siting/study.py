@@ -44,7 +44,12 @@ from orchestrator.studies.siting.confirmation import (
     confirmed,
     swings_outside,
 )
-from orchestrator.studies.siting.residues import SeenMode, Situation, situation_of
+from orchestrator.studies.siting.residues import (
+    BusesAsked,
+    SeenMode,
+    Situation,
+    situation_of,
+)
 
 PODS = {"pod_p": placing.ACTIVE, "pod_q": placing.REACTIVE}
 DROOP = "droop"
@@ -144,15 +149,16 @@ class SiteRequest(OfCase):
 @dataclass(frozen=True)
 class SupportShift:
     """Δλ [rad/s] by a device, or by 1 MW/Hz or 1 Mvar/Hz without a phase shift; the change of the damping ratio
-    [points], with the phase that a tuned POD gives or by the device as it is; and its part of the best bus's."""
+    [points], with the phase that a tuned POD gives or by the device as it is; and its part of the best bus's, None
+    where not all buses were looked at."""
 
     change: complex
     damping: float
-    part: float
+    part: float | None
 
     @property
     def hardly(self) -> bool:
-        return self.part < HARDLY
+        return self.part is not None and self.part < HARDLY
 
 
 DEVICE = "device"
@@ -237,12 +243,13 @@ def find_sites(
         open_case = replace(open_case, line_ends=opening)
         preparation = ItemPreparation(open_case, scenario, request.layers, request.step_size)
     total = len(outages) + request.confirm
+    asked = BusesAsked(frozenset(buses), bool(request.buses), request.is_foreign)
     situations, not_judged = [], dict[str, str]()
     for k, outage in enumerate(outages):
         report(k, total)
         item = Item(0, k, {}, outage.elements, outage.elements)
         try:
-            one = _situation(preparation, item, outage.name, request)
+            one = _situation(preparation, item, outage.name, request, asked)
         except CosimError as error:
             if not outage.elements:
                 raise
@@ -273,11 +280,15 @@ def find_sites(
 
 
 def _situation(
-    preparation: ItemPreparation, item: Item, name: str, request: SiteRequest
+    preparation: ItemPreparation,
+    item: Item,
+    name: str,
+    request: SiteRequest,
+    places: BusesAsked,
 ) -> Situation:
     """The network as it is, or after an outage, which is computed with wider limits of exciters and governors where
     these alone keep it from starting."""
-    asked = (name, request.frequencies, 100 * request.below)
+    asked = (name, request.frequencies, 100 * request.below, places)
     if not item.out:
         return situation_of(preparation.base, *asked)
     prepared = preparation.prepared(item).scenario
@@ -309,7 +320,8 @@ def _shifted(
     else:
         shifts[DEVICE] = shifts[PODS[request.name]]
     found = SiteResult(case, request, tuple(situations), shifts, (), not_judged)
-    buses = [bus for bus in situations[0].voltages if all(bus in s.voltages for s in situations)]
+    known = [set(by_bus) for by_mode in shifts[DEVICE].values() for by_bus in by_mode.values()]
+    buses = [bus for bus in situations[0].voltages if all(bus in there for there in known)]
     return replace(found, ranking=tuple(sorted(buses, key=lambda bus: -found.least(bus)[0])))
 
 
@@ -319,22 +331,25 @@ def _ideal(kind: str) -> Shift:
     )
 
 
-def _all_shifts(situations: Sequence[Situation], shift: Shift, *, tuned: bool) -> dict[str, ByMode]:
+def _all_shifts(
+    situations: Sequence[Situation], shift: Shift, *, tuned: bool, in_full: bool = False
+) -> dict[str, ByMode]:
+    """The shifts at all buses, or ``in_full`` at those that were looked into."""
     found: dict[str, ByMode] = {}
     for at in situations:
         by_mode = dict[str, Mapping[str, SupportShift]]()
         for seen in at.modes:
-            changes = {bus: shift(at, bus, seen) for bus in at.voltages}
-            most = max(map(abs, changes.values())) or 1.0
+            buses = at.looked_into if in_full else at.voltages
+            changes = {bus: shift(at, bus, seen) for bus in at.voltages if bus in buses}
+            most = max(map(abs, changes.values()), default=0.0) or 1.0
             eigenvalue, before = seen.mode.eigenvalue, seen.mode.damping_percent
-            by_mode[seen.label] = {
-                bus: SupportShift(
-                    c,
-                    damping_percent(eigenvalue + (-abs(c) if tuned else c)) - before,
-                    abs(c) / most,
-                )
-                for bus, c in changes.items()
-            }
+            knows_best = at.knows_all and len(changes) == len(at.voltages)
+            by_bus = dict[str, SupportShift]()
+            for bus, change in changes.items():
+                after = damping_percent(eigenvalue + (-abs(change) if tuned else change))
+                part = abs(change) / most if knows_best else None
+                by_bus[bus] = SupportShift(change, after - before, part)
+            by_mode[seen.label] = by_bus
         found[at.name] = by_mode
     return found
 
@@ -349,7 +364,7 @@ def _of_foreign(
     """A foreign device, linearised once at the bus that active power reaches best, and turned to the others."""
     intact = situations[0]
     there = active[intact.name][intact.modes[0].label]
-    bus = max(there, key=lambda name: abs(there[name].change))
+    bus = max(intact.looked_into, key=lambda name: abs(there[name].change))
     device = placing.foreign(Path(request.device), request.binding_file, request.rating)
     prepared = _prepared(placing.with_devices(case, device, [bus]), request, scenario)
     with running(prepared) as master:
@@ -363,7 +378,7 @@ def _of_foreign(
                 lambda there: placing.turned(placing.response_of(master, model, there), ahead),
             )
 
-        return _all_shifts(situations, shift, tuned=False)
+        return _all_shifts(situations, shift, tuned=False, in_full=True)
 
 
 def _prepared(case: Case, request: SiteRequest, scenario: str) -> PreparedScenario:

@@ -152,7 +152,7 @@ def answer_in_parts(result: SiteResult) -> tuple[str, str]:
     is_place = f"is the best place for {device_title(result)}{among}"
     if len(result.ranking) == 1:  # the best and the worst of one
         is_place = f"as a place for {device_title(result)}"
-    if moved.hardly:
+    if moved.hardly and moved.part is not None:
         part = f"{100 * moved.part:.1g} % of what the strongest place does"
         is_place = f"is hardly a place for {device_title(result)}, with {part}"
     return (
@@ -351,14 +351,16 @@ def remarks(result: SiteResult) -> list[str]:
         reach = max(
             abs(s.damping) for s in result.shifts[ACTIVE][result.intact.name][seen.label].values()
         )
+        share = shifts[best].part
+        if share is None:
+            continue
         if reach < _NONE:
             said.append(
                 f"{_called(seen)}: no bus reaches this mode; it cannot be damped from the network"
             )
         elif shifts[best].hardly:
-            part = f"{100 * shifts[best].part:.1g} % of {strongest}"
-            out_of_reach.append((_called(seen), part))
-    said += _not_controllable(out_of_reach, best)
+            out_of_reach.append((_called(seen), f"{100 * share:.1g} % of {strongest}"))
+    said += [*_not_controllable(out_of_reach, best), *_what_was_looked_at(result)]
     said += [
         f"outage {at.name}: {', '.join(map(str, at.widenings))}, so that it starts"
         for at in result.situations
@@ -369,6 +371,23 @@ def remarks(result: SiteResult) -> list[str]:
         there = few(result.terminals, _NAMED)
         said.append(f"left out: the terminals of units, {there}; --buses 'bus_*' takes all buses")
     return said
+
+
+def _what_was_looked_at(result: SiteResult) -> list[str]:
+    """Say of a large network what is not known of all its buses."""
+    network = result.prepared.network
+    if not result.intact.knows_all and network is not None:
+        number = f"{len(result.intact.voltages)} of {len(network.buses)} buses"
+        return [
+            f"looked at: the {number} that {Option.BUSES} names; what the others would do is not known"
+        ]
+    behind = [bus for bus in result.ranking if bus not in result.intact.looked_into]
+    if not behind:
+        return []
+    return [
+        f"{len(behind)} of the {len(result.ranking)} buses, which move the least damped mode less than the first ones, "
+        "were not looked into: their figures leave out what support does to the voltage of its own bus"
+    ]
 
 
 def _not_controllable(modes: Sequence[tuple[str, str]], bus: str) -> list[str]:
@@ -458,6 +477,7 @@ def _bus_json(result: SiteResult, bus: str, rank: int) -> dict[str, Any]:
     return {
         "bus": bus,
         "rank": rank,
+        "looked_into": bus in result.intact.looked_into,
         "shift": shifts(DEVICE, _unit_in_keys(result)),
         "p": shifts(ACTIVE, _MW),
         "q": shifts(REACTIVE, _MVAR),
@@ -492,7 +512,7 @@ def _shift(shift: SupportShift, unit: str = "") -> dict[str, Any]:
         "real": shift.change.real,
         "imag": shift.change.imag,
         "part_of_best": shift.part,
-        "controllable": not shift.hardly,
+        "controllable": None if shift.part is None else not shift.hardly,
     }
 
 
@@ -691,7 +711,10 @@ def _map(result: SiteResult, seen: SeenMode, figures: Figures) -> str:
     assert network is not None
     branches = [(line.from_bus, line.to_bus) for line in network.lines]
     branches += [(x.buses[0], bus) for x in network.transformers for bus in x.buses[1:]]
-    texts = {
+    most = max(abs(one.change) for one in shifts.values()) or 1.0
+    heat = dict.fromkeys(network.buses, 0.0)
+    heat |= {bus: abs(one.change) / most for bus, one in shifts.items()}
+    texts = {bus: f"{result.prepared.names.of(bus)}: not looked at" for bus in network.buses} | {
         bus: f"{result.prepared.names.of(bus)}: {shift_text(result, one.damping)} {unit(result, '100')}"
         for bus, one in shifts.items()
     }
@@ -703,7 +726,7 @@ def _map(result: SiteResult, seen: SeenMode, figures: Figures) -> str:
         network_map(
             seen.label,
             branches,
-            {b: one.part for b, one in shifts.items()},
+            heat,
             texts,
             labels=result.prepared.names.of,
         ),

@@ -4,11 +4,12 @@ eigenvalues of every setting: the same."""
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.linear.spectra import slowest_decay
+from orchestrator.linear.spectra import slowest_decay, stability
 from orchestrator.studies.siting import least_damping
 from orchestrator.studies.siting.study import SiteRequest, find_sites
 
 CLOSE = 1e-6
+PLACES = (("wscc9", "pod_p"), ("wscc9", "pod_q"), ("ieee39", "pod_p"))
 
 
 @pytest.fixture
@@ -30,14 +31,24 @@ def by_following(monkeypatch):
     monkeypatch.setattr(slowest_decay, "LEAST_STATES", 0)
 
 
+def by_search(monkeypatch):
+    by_following(monkeypatch)
+    for module in (least_damping, stability):
+        monkeypatch.setattr(module, "WHOLE", 0)
+    monkeypatch.setattr(least_damping, "FOLLOWED", 3)
+
+
 def by_one_form(monkeypatch):
     monkeypatch.setattr(least_damping, "LEAST_CHANGED", 0)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("way", [by_following, by_one_form])
 @pytest.mark.parametrize(
-    ("case", "device"), [("wscc9", "pod_p"), ("wscc9", "pod_q"), ("ieee39", "pod_p")]
+    ("case", "device", "way"),
+    [
+        ("wscc9", "pod_p", by_search),
+        *((*places, way) for places in PLACES for way in (by_following, by_one_form)),
+    ],
 )
 def test_a_place_has_the_same_figures_both_ways(case, device, way, settings, monkeypatch):
     request = SiteRequest(device, confirm=1)

@@ -100,6 +100,17 @@ def test_followed_settings_lead_to_the_same(monkeypatch, spectra, other, elsewhe
     assert len(set(spectra)) < 15
 
 
+def test_a_system_too_large_for_all_eigenvalues_has_none_computed(monkeypatch, spectra):
+    """Planted: with the largest gain something grows that no followed swing shows."""
+    loop = LargeLoop(lambda K: 0.15, lambda K: -0.01 if K > 120 else 0.1)
+    expected = tuned(loop)
+    spectra.clear()
+    for name, number in (("MOST_WHOLE", 0), ("WHOLE", 0), ("FOLLOWED", 1)):
+        monkeypatch.setattr(least_damping, name, number)
+    assert tuned(loop) == expected
+    assert not spectra
+
+
 def test_what_grows_elsewhere_is_unseen_until_it_is_asked_for(monkeypatch):
     """This is why those settings that decide have all their eigenvalues computed."""
     monkeypatch.setattr(least_damping, "MOST_WHOLE", 0)

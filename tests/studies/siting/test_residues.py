@@ -65,12 +65,12 @@ def test_a_question_is_asked_once(gfor, tmp_path):
 def test_a_wrong_sign_at_the_bus_is_caught(gfor, monkeypatch):
     """The ranking alone, by sizes, would not show it; the coupled FMUs do."""
 
-    def reversed_inputs(blocks, schedule):
-        space = true_space(blocks, schedule)
-        return replace(space, B=-space.B)
+    def reversed_currents(*given):
+        ports = true_ports(*given)
+        return replace(ports, into_states=-ports.into_states, into_wires=-ports.into_wires)
 
-    true_space = residues.state_space
-    monkeypatch.setattr(residues, "state_space", reversed_inputs)
+    true_ports = residues.BusPorts.of
+    monkeypatch.setattr(residues.BusPorts, "of", reversed_currents)
     code, out, _ = gfor(
         "site", "two_area_rms", "--scenario", "gfor", "--confirm", "1", "--rating", "400"
     )
