@@ -16,7 +16,13 @@ from orchestrator.linear.spectra.modes import (
     oscillations,
 )
 from orchestrator.linear.spectra.stability import grows
-from orchestrator.studies.coordinated_design.open_loops import LEAD, OpenLoops, PodPlace, Setting
+from orchestrator.studies.coordinated_design.open_loops import (
+    LEAD,
+    ClosedLoop,
+    OpenLoops,
+    PodPlace,
+    Setting,
+)
 
 BANDS_HZ = (*ELECTROMECHANICAL_HZ, 10.0, 100.0)
 """Between these frequencies [Hz] other modes are compared with those that were there before."""
@@ -51,7 +57,7 @@ class Aim:
 @dataclass(frozen=True)
 class Watched:
     value: complex  # λ [rad/s]
-    place: int  # its column among the eigenvectors
+    place: int  # in its spectrum
     # damping ratio that it may not fall below; None for a mode that the design damps
     floor: float | None
     hardly_moved: bool = False
@@ -101,8 +107,8 @@ def split(
 def kept_as_they_are(watched: Sequence[Watched], values: Iterable[complex]) -> list[Watched]:
     """The modes, of which those that are next to some values [rad/s] are not damped, and keep what these have."""
     found = list(watched)
-    for value in values:
-        k = nearest(found, value)
+    wanted = tuple(values)
+    for k, value in zip(places_next_to(watched, wanted), wanted, strict=True):
         if k is not None:
             found[k] = replace(found[k], floor=damping_ratio(value) - ALLOWED)
     return found
@@ -110,8 +116,19 @@ def kept_as_they_are(watched: Sequence[Watched], values: Iterable[complex]) -> l
 
 def nearest(watched: Sequence[Watched], value: complex) -> int | None:
     """Which of the modes is that of a value [rad/s] that hardly moves; None if none is near."""
-    k = min(range(len(watched)), key=lambda k: abs(watched[k].value - value), default=None)
-    return k if k is not None and abs(watched[k].value - value) < UNMOVED * abs(value) else None
+    (found,) = places_next_to(watched, [value])
+    return found
+
+
+def places_next_to(watched: Sequence[Watched], values: Sequence[complex]) -> list[int | None]:
+    """For each value which of the modes `nearest` gives."""
+    if not (watched and values):
+        return [None] * len(values)
+    wanted = np.array(values)
+    distances = np.abs(wanted[:, None] - np.array([mode.value for mode in watched]))
+    closest = distances.argmin(axis=1)
+    near = distances[np.arange(len(wanted)), closest] < UNMOVED * np.abs(wanted)
+    return [k if is_near else None for k, is_near in zip(closest.tolist(), near, strict=True)]
 
 
 def growth(values: Complex) -> float:
@@ -170,7 +187,8 @@ class RatedPoint:
         self.apart = tuple(apart)
         self._held: tuple[complex, ...] = ()
         self._hardly: tuple[complex, ...] = ()
-        values, targets, left, right = self._spectrum({})
+        closed = self.loops.solve({})
+        values, targets = closed.values, self._named_places(closed)
         self._before = growth(values)
         modes = split(values, targets, floors_of((), 0.0))
         self._floors = floors_of(
@@ -180,9 +198,10 @@ class RatedPoint:
             return
         gains = np.array([largest.get(place, 0.0) for place in loops.places])
         damped = [mode for mode in modes if mode.floor is None]
-        reach = [np.abs(self._residues(mode.place, left, right)) @ gains for mode in damped]
+        reach = np.abs(self._residues([mode.place for mode in damped], closed)) @ gains
         parts = [
-            (mode.value, size / abs(mode.value)) for mode, size in zip(damped, reach, strict=True)
+            (mode.value, size / abs(mode.value))
+            for mode, size in zip(damped, reach.tolist(), strict=True)
         ]
         in_service = all(place in loops.places for place in largest)
         if targets is None and in_service and any(part >= APART for _, part in parts):
@@ -193,45 +212,39 @@ class RatedPoint:
             value for value, part in counting if LEAD * part >= _HELD and part < UNMOVED
         )
 
-    def _residues(self, place: int, left: Complex, right: Complex) -> Complex:
-        """How far each loop moves an eigenvalue with all loops open [rad/s per pu]."""
-        row, column = left[:, place].conj(), right[:, place]
-        return np.asarray(
-            (row @ self.loops.U) * (self.loops.V @ column) / (row @ column), dtype=complex
-        )
+    def _residues(self, places: Sequence[int], closed: ClosedLoop) -> Complex:
+        """How far each loop moves eigenvalues with all loops open [rad/s per pu], shape (modes, loops)."""
+        left, right = closed.vectors(places)
+        rows = left.conj().T
+        lengths = np.sum(rows * right.T, axis=1)[:, None]
+        return np.asarray((rows @ self.loops.U) * (self.loops.V @ right).T / lengths, dtype=complex)
 
     def _split(self, values: Complex, targets: Iterable[int] | None) -> list[Watched]:
         """The modes; those that no loop moves, or hardly any gain, are not damped but kept as they are."""
         found = kept_as_they_are(split(values, targets, self._floors), (*self._held, *self.apart))
-        for value in self._hardly:
-            k = nearest(found, value)
+        for k in places_next_to(found, self._hardly):
             if k is not None:
                 found[k] = replace(found[k], hardly_moved=True)
         return found
 
-    def _spectrum(self, setting: Setting) -> tuple[Complex, list[int] | None, Complex, Complex]:
-        """Eigenvalues, places of the named modes, and left and right eigenvectors."""
-        found = self.loops.solve(setting)
-        return (
-            found.values,
-            self._named_places(found.values, found.left, found.right),
-            found.left,
-            found.right,
-        )
-
-    def _named_places(self, values: Complex, left: Complex, right: Complex) -> list[int] | None:
+    def _named_places(self, closed: ClosedLoop) -> list[int] | None:
         """Places of the named modes; None where one of the names is not borne here, so that all modes count."""
         if self._aim.naming is None:
             return None
         # without those that a reduction left out
-        names, own = self.loops.all_names(len(left)), values[: len(left)]
+        values = closed.values[: closed.own]
         places = [
-            k for k in np.flatnonzero(oscillations(own)).tolist() if band_of(values[k]) == _SWINGING
+            k
+            for k in np.flatnonzero(oscillations(values)).tolist()
+            if band_of(values[k]) == _SWINGING
         ]
-        modes = {}
-        for k in places:
-            sides = self.loops.whole(left[:, k], left=True), self.loops.whole(right[:, k])
-            modes[k] = make_mode(complex(values[k]), *sides, names)
+        left, right = closed.vectors(places)
+        names = self.loops.all_names(len(left))
+        left, right = self.loops.whole(left, left=True), self.loops.whole(right)
+        modes = {
+            k: make_mode(complex(values[k]), left[:, j], right[:, j], names)
+            for j, k in enumerate(places)
+        }
         found = self._aim.naming(names, list(modes.values()))
         if any(name not in found for name in self._aim.names):
             return None
@@ -242,12 +255,13 @@ class RatedPoint:
         if self._aim.naming is None:
             values, targets = self.loops.eigenvalues(setting), None
         else:
-            values, targets = self._spectrum(setting)[:2]
+            closed = self.loops.solve(setting)
+            values, targets = closed.values, self._named_places(closed)
         return worth_of(self._split(values, targets), growth(values), self._before, self.number)
 
     def residues(self) -> dict[PodPlace, complex]:
         """How far each loop moves the least damped of the modes that any moves [rad/s per pu]; empty without one."""
-        watched, left, right = self.watched({})
+        watched, closed = self.watched({})
         worst = min(
             (mode for mode in watched if mode.floor is None),
             key=lambda mode: mode.damping,
@@ -255,14 +269,13 @@ class RatedPoint:
         )
         if worst is None:
             return {}
-        return dict(
-            zip(self.loops.places, self._residues(worst.place, left, right).tolist(), strict=True)
-        )
+        (shifts,) = self._residues([worst.place], closed).tolist()
+        return dict(zip(self.loops.places, shifts, strict=True))
 
-    def watched(self, setting: Setting) -> tuple[list[Watched], Complex, Complex]:
-        """Its modes with a setting, with the left and the right eigenvectors of all."""
-        values, targets, left, right = self._spectrum(setting)
-        return self._split(values, targets), left, right
+    def watched(self, setting: Setting) -> tuple[list[Watched], ClosedLoop]:
+        """Its modes with a setting, and the closed loops that have them."""
+        closed = self.loops.solve(setting)
+        return self._split(closed.values, self._named_places(closed)), closed
 
 
 def together(worths: Iterable[Worth]) -> Worth:

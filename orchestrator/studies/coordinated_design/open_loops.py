@@ -4,7 +4,8 @@ Each loop is measured on the running FMU: from where its signal acts to its sign
 Washout, filter and sign are the FMU's own. Only the gain and the lead/lag are put in between here."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg
@@ -12,13 +13,24 @@ from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Complex, Matrix, Vector
 from orchestrator.linear.spectra.real_schur import RealSchur
+from orchestrator.studies.coordinated_design.modal_loops import (
+    ClosedModes,
+    Feedback,
+    ModalLoops,
+    Places,
+)
 from orchestrator.studies.pod_design.closed_loop import PodSetting
-from orchestrator.studies.pod_design.lead_lag import LARGEST_STAGE_ANGLE, lead_lag_turning
+from orchestrator.studies.pod_design.lead_lag import (
+    LARGEST_STAGE_ANGLE,
+    NO_COMPENSATION,
+    lead_lag_turning,
+)
 
 MOST_VECTORS = 2500
 """Up to this number of states all eigenvectors of a system are computed; in larger ones those that are kept."""
 
 REDUCED = 300  # systems with more states are reduced to their slow modes
+MODAL = 250  # of reduced systems with more states, loops are closed in the coordinates of the modes
 # faster modes than this [rad/s] answer as they do at rest, unless loops move them
 _FASTEST = 2 * np.pi * 30
 
@@ -34,6 +46,10 @@ _MOVED = 0.02
 _SLOWEST = 0.3
 """Size [rad/s] that a slower mode counts as."""
 
+# time constants of a lead/lag that differ by a smaller part turn nothing
+_NEUTRAL = 1e-12
+# gain [pu] of a loop that is closed to have its states alone; modes that 400 pu move by their size feel 10⁻⁸ of it
+_UNFELT = 5e-6
 _TRUE = 1e-6  # A reduction whose modes are not those of the system to this part is not taken
 _SEEN = (0.05, 4.0)  # modes between these frequencies [Hz] are kept however little they move
 # the setting of each loop that is closed; the others stay open
@@ -58,11 +74,28 @@ class PodPlace:
 
 @dataclass(frozen=True)
 class ClosedLoop:
-    values: Complex  # λ [rad/s]; of a reduced system, those that it left out stand last
-    # left, right: eigenvectors as columns, of a reduced system in its own coordinates and without those that it left
-    # out
-    left: Complex
-    right: Complex
+    """All modes of closed loops.
+
+    ``values``: λ [rad/s]; of a reduced system, those that it left out stand last.
+    ``own``: number of those that have eigenvectors: all but those that a reduced system left out.
+    ``vectors``: gives the left and right eigenvectors of some places, of the upper half or real, as columns; of a
+    reduced system in its own coordinates."""
+
+    values: Complex
+    own: int
+    vectors: Callable[[Sequence[int]], tuple[Complex, Complex]]
+
+
+@dataclass(frozen=True)
+class _Closing:
+    """What closes loops: w = through·y + out·ξ, with states ξ of the lead/lag stages, ξ' = own·ξ + entry·y."""
+
+    used: list[int]  # places of the loops that are closed
+    feedback: Feedback
+    through: Vector
+    own: Matrix
+    entry: Matrix
+    out: Matrix
 
 
 @dataclass(frozen=True)
@@ -110,12 +143,15 @@ class OpenLoops:
         """The matrix of the system with some loops closed.
 
         Returns shape (r + k, r + k): behind the states x stand those of the lead/lag stages, loop by loop."""
+        return self._matrix(self._closing(setting))
+
+    def _closing(self, setting: Setting) -> _Closing:
         used = [
             k for k, place in enumerate(self.places) if place in setting and setting[place].gain
         ]
         parts = [setting[self.places[k]] for k in used]
         stages = [part.filters.N_S if part.filters.T_S2 else 0 for part in parts]
-        r, z = len(self.A), sum(stages)
+        z = sum(stages)
         through, out = np.zeros(len(used)), np.zeros((len(used), z))
         own, entry = np.zeros((z, z)), np.zeros((z, len(used)))
         first = 0
@@ -131,20 +167,148 @@ class OpenLoops:
                 out[j, row] = part.gain * ratio ** (count - 1 - stage) * (1 - ratio)
             through[j] = part.gain * ratio**count
             first += count
-        U, V, D = self.U[:, used], self.V[used], self.D[np.ix_(used, used)]
-        turn = np.linalg.inv(np.eye(len(used)) - through[:, None] * D)
-        P, Q = turn @ (through[:, None] * V), turn @ out
+        gains = np.array([part.gain for part in parts])
+        feedback = Feedback(gains, tuple(part.filters for part in parts))
+        return _Closing(used, feedback, through=through, own=own, entry=entry, out=out)
+
+    def _matrix(self, closing: _Closing) -> Vector:
+        U, V, D = self._at(closing)
+        P, Q = self._turned(closing)
+        r, z = len(self.A), len(closing.own)
         whole = np.zeros((r + z, r + z), dtype=np.result_type(self.A, P))
         whole[:r, :r], whole[:r, r:] = self.A + U @ P, U @ Q
-        whole[r:, :r], whole[r:, r:] = entry @ (V + D @ P), own + entry @ (D @ Q)
+        whole[r:, :r] = closing.entry @ (V + D @ P)
+        whole[r:, r:] = closing.own + closing.entry @ (D @ Q)
         return whole
 
+    def _at(self, closing: _Closing) -> tuple[Vector, Vector, Vector]:
+        used = closing.used
+        return self.U[:, used], self.V[used], self.D[np.ix_(used, used)]
+
+    def _turned(self, closing: _Closing) -> tuple[Vector, Vector]:
+        """What acts in the place of the signals, by the states x and by those of the stages."""
+        _, V, D = self._at(closing)
+        through = closing.through[:, None]
+        turn = np.linalg.inv(np.eye(len(V)) - through * D)
+        return turn @ (through * V), turn @ closing.out
+
+    def _trace(self, closing: _Closing) -> float:
+        U, _, D = self._at(closing)
+        P, Q = self._turned(closing)
+        of_stages = np.trace(closing.own + closing.entry @ (D @ Q))
+        return float(np.trace(self.A) + np.sum(U * P.T) + of_stages)
+
     def solve(self, setting: Setting) -> ClosedLoop:
-        values, left, right = scipy.linalg.eig(self.closed(setting), left=True, right=True)
-        return ClosedLoop(self._with_rest(values), left, right)
+        closing = self._closing(setting)
+        modes, neutral = self._closed_modes(setting)
+        if modes is not None:
+            return ClosedLoop(
+                self._with_rest(np.concatenate([modes.values, neutral])),
+                len(modes.values),
+                lambda places: self._real_vectors(modes, closing, places),
+            )
+        values, left, right = scipy.linalg.eig(self._matrix(closing), left=True, right=True)
+        return ClosedLoop(
+            self._with_rest(values), len(values), lambda places: (left[:, places], right[:, places])
+        )
 
     def eigenvalues(self, setting: Setting) -> Complex:
+        modes, neutral = self._closed_modes(setting)
+        if modes is not None:
+            return self._with_rest(np.concatenate([modes.values, neutral]))
         return self._with_rest(np.linalg.eigvals(self.closed(setting)).astype(complex))
+
+    def _closed_modes(self, setting: Setting) -> tuple[ClosedModes | None, Complex]:
+        """The modes by way of those of the open loops, and those of lead/lags that turn nothing, or nothing that is
+        felt, which stay where they are.
+
+        None of a small system, of one that is not reduced, whose vectors may be ill-defined, and where they cannot be
+        told so."""
+        neutral: list[complex] = []
+        if self.right is None or len(self.A) <= MODAL:
+            return None, np.array(neutral)
+        turning = dict(setting)
+        for place, one in setting.items():
+            filters = one.filters
+            turns = filters.T_S2 and abs(filters.T_S1 / filters.T_S2 - 1) >= _NEUTRAL
+            if filters.T_S2 and not (turns and one.gain > _UNFELT):
+                turning[place] = replace(one, filters=NO_COMPENSATION)
+                shown = place in self.places and one.gain
+                neutral += [-1 / filters.T_S2 + 0j] * (filters.N_S if shown else 0)
+        closing = self._closing(turning)
+        modal = self._modal(closing.used)
+
+        def small(places: Places) -> Complex:
+            columns = self._columns[places]
+            part = replace(
+                self,
+                A=self.A[np.ix_(columns, columns)],
+                U=self.U[columns],
+                V=self.V[:, columns],
+            )
+            return np.linalg.eigvals(part._matrix(closing)).astype(complex)
+
+        found = modal.closed(closing.feedback, self._trace(closing), small)
+        return found, np.array(neutral, dtype=complex)
+
+    def _modal(self, used: list[int]) -> ModalLoops:
+        """The loops of some places in the coordinates of the modes, which are those of the blocks of A."""
+        known = self._modal_loops
+        if (key := tuple(used)) not in known:
+            p, U, V = self._pairs, self.U[:, used], self.V[used]
+            real = len(self.A) - 2 * p
+            first, second = slice(real, None, 2), slice(real + 1, None, 2)
+            values = np.diag(self.A).astype(complex)
+            upper = values[first] + 1j * np.diag(self.A, 1)[first]
+            driven, seen = (U[first] - 1j * U[second]) / 2, V[:, first] + 1j * V[:, second]
+            known[key] = ModalLoops(
+                np.concatenate([values[:real], upper, upper.conj()]),
+                np.vstack([U[:real], driven, driven.conj()]),
+                C=np.hstack([V[:, :real], seen, seen.conj()]),
+                D=self.D[np.ix_(used, used)],
+            )
+        return known[key]
+
+    @cached_property
+    def _modal_loops(self) -> dict[tuple[int, ...], ModalLoops]:
+        return {}
+
+    @cached_property
+    def _pairs(self) -> int:
+        return int((np.diag(self.A, 1) != 0).sum())
+
+    @cached_property
+    def _columns(self) -> Places:
+        """For each mode its column: of the upper half of a pair the first, of the lower half the second."""
+        real = len(self.A) - 2 * self._pairs
+        rest = np.arange(real, len(self.A))
+        return np.concatenate([np.arange(real), rest[::2], rest[1::2]])
+
+    def _real_vectors(
+        self, modes: ClosedModes, closing: _Closing, places: Sequence[int]
+    ) -> tuple[Complex, Complex]:
+        """Left and right eigenvectors as columns, of the real states and those of the stages."""
+        found, p = modes.vectors(places), self._pairs
+        real, n, k = len(self.A) - 2 * p, len(self.A), len(places)
+        right, left = (np.zeros((k, n + len(closing.own)), dtype=complex) for _ in range(2))
+        first, second = slice(real, n, 2), slice(real + 1, n, 2)
+        for to, given, turn in ((right, found.right, 1j), (left, found.left / 2, -1j)):
+            upper, lower = given[:, real : real + p], given[:, real + p :]
+            to[:, :real] = given[:, :real]
+            to[:, first], to[:, second] = upper + lower, turn * (upper - lower)
+        left[:, :real] *= 2
+        if len(closing.own):
+            inner = (
+                modes.values[list(places)][:, None, None] * np.eye(len(closing.own)) - closing.own
+            )
+            right[:, n:] = np.linalg.solve(inner, (found.signals @ closing.entry.T)[:, :, None])[
+                :, :, 0
+            ]
+            turned = inner.transpose(0, 2, 1)
+            left[:, n:] = np.linalg.solve(turned, (found.weights @ closing.out)[:, :, None])[
+                :, :, 0
+            ]
+        return left.conj().T, right.T
 
     def _with_rest(self, values: Complex) -> Complex:
         return values if self.rest is None else np.concatenate([values, self.rest])
@@ -154,7 +318,7 @@ class OpenLoops:
         return (*self.names, *(f"stage {k + 1}" for k in range(size - len(self.A))))
 
     def whole(self, vector: Complex, *, left: bool = False) -> Complex:
-        """An eigenvector of a closed loop in all n states and the stages."""
+        """Eigenvectors of a closed loop, one or columns, in all n states and the stages."""
         if self.right is None or self.left is None:
             return vector
         r = len(self.A)

@@ -223,7 +223,7 @@ class SettingSearch:
     def _rows(self, point: RatedPoint, x: Numbers) -> Iterator[tuple[Watched, Numbers]]:
         """The modes of one point that count, with the sensitivities of their damping ratios to all numbers of x."""
         setting = self._space.setting(x, searching=True)
-        watched, left, right = point.watched(setting)
+        watched, closed = point.watched(setting)
         damped = [mode for mode in watched if mode.floor is None]
         worst = min((mode.damping for mode in damped), default=1.0)
         rest = min((mode.damping for mode in damped if not mode.hardly_moved), default=worst)
@@ -236,15 +236,13 @@ class SettingSearch:
             slopes.append(
                 (point.loops.closed(self._space.setting(moved, searching=True)) - base) / step
             )
-        for mode in watched:
-            least = worst if mode.hardly_moved else rest
-            near = mode.damping < (
-                least + _NEAR if mode.floor is None else mode.floor + _NEAR_FLOOR
-            )
-            if near and mode.place < left.shape[1]:
-                row, column = left[:, mode.place].conj(), right[:, mode.place]
-                shifts = [complex(row @ slope @ column / (row @ column)) for slope in slopes]
-                yield mode, np.array([damping_change(mode.value, shift) for shift in shifts])
+        near = [mode for mode in watched if mode.place < closed.own and _is_near(mode, worst, rest)]
+        left, right = closed.vectors([mode.place for mode in near])
+        rows = left.conj().T
+        lengths = np.sum(rows * right.T, axis=1)
+        shifts = np.array([np.sum((rows @ slope) * right.T, axis=1) / lengths for slope in slopes])
+        for mode, own in zip(near, shifts.T.tolist(), strict=True):
+            yield mode, np.array([damping_change(mode.value, shift) for shift in own])
 
     def with_least_gain(self, found: Tried, wanted: float) -> Tried:
         """The smallest part of all gains that still gives a wanted damping ratio at every point."""
@@ -261,6 +259,14 @@ class SettingSearch:
 
         halve_towards(1.0, 0.0, holds, most=_HALVINGS_OF_GAINS)
         return best
+
+
+def _is_near(mode: Watched, worst: float, rest: float) -> bool:
+    """Whether a mode counts in a linear program.
+
+    ``worst``, ``rest``: least damping ratio of all modes to be damped, and of those that are moved more than hardly."""
+    least = worst if mode.hardly_moved else rest
+    return mode.damping < (least + _NEAR if mode.floor is None else mode.floor + _NEAR_FLOOR)
 
 
 class _Program:

@@ -13,6 +13,7 @@ from orchestrator.studies.coordinated_design.objective import (
     band_of,
     floors_of,
 )
+from orchestrator.studies.coordinated_design.open_loops import ClosedLoop
 
 
 @pytest.mark.parametrize("place", range(len(BANDS_HZ)))
@@ -35,7 +36,8 @@ def test_a_residue_is_what_a_small_gain_moves():
     A, U, V = rng.normal(size=(4, 4)), rng.normal(size=(4, 1)), rng.normal(size=(1, 4))
     values, left, right = eig(A, left=True)
     point = SimpleNamespace(loops=SimpleNamespace(U=U, V=V))
-    (residue,) = RatedPoint._residues(point, 0, left, 3 * right)
+    closed = ClosedLoop(values, 4, lambda places: (left[:, places], 3 * right[:, places]))
+    ((residue,),) = RatedPoint._residues(point, [0], closed)
     moved = np.linalg.eigvals(A + 1e-6 * U @ V)
     assert residue == pytest.approx(
         (moved[np.argmin(abs(moved - values[0]))] - values[0]) / 1e-6, rel=1e-4
