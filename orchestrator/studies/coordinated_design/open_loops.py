@@ -88,7 +88,7 @@ class ClosedLoop:
 
 @dataclass(frozen=True)
 class _Closing:
-    """What closes loops: w = through·y + out·ξ, with states ξ of the lead/lag stages, ξ' = own·ξ + entry·y."""
+    """The part that closes loops: w = through·y + out·ξ, with states ξ of the lead/lag stages, ξ' = own·ξ + entry·y."""
 
     used: list[int]  # places of the loops that are closed
     feedback: Feedback
@@ -186,7 +186,7 @@ class OpenLoops:
         return self.U[:, used], self.V[used], self.D[np.ix_(used, used)]
 
     def _turned(self, closing: _Closing) -> tuple[Vector, Vector]:
-        """What acts in the place of the signals, by the states x and by those of the stages."""
+        """Matrices of what acts in the place of the signals, by the states x and by those of the stages."""
         _, V, D = self._at(closing)
         through = closing.through[:, None]
         turn = np.linalg.inv(np.eye(len(V)) - through * D)
@@ -253,8 +253,8 @@ class OpenLoops:
 
     def _modal(self, used: list[int]) -> ModalLoops:
         """The loops of some places in the coordinates of the modes, which are those of the blocks of A."""
-        known = self._modal_loops
-        if (key := tuple(used)) not in known:
+        known, key = self._modal_loops, tuple(used)
+        if key not in known:
             p, U, V = self._pairs, self.U[:, used], self.V[used]
             real = len(self.A) - 2 * p
             first, second = slice(real, None, 2), slice(real + 1, None, 2)

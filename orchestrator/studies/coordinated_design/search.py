@@ -262,7 +262,7 @@ class SettingSearch:
 
 
 def _is_near(mode: Watched, worst: float, rest: float) -> bool:
-    """Whether a mode counts in a linear program.
+    """Tell whether a mode counts in a linear program.
 
     ``worst``, ``rest``: least damping ratio of all modes to be damped, and of those that are moved more than hardly."""
     least = worst if mode.hardly_moved else rest
