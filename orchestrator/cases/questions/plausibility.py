@@ -20,6 +20,7 @@ from orchestrator.cases.questions.plausible_networks import network_doubts
 from orchestrator.cases.questions.plausible_ranges import SMALLEST_SHARE
 from orchestrator.cases.questions.plausible_sources import SOLVED, source_doubts
 from orchestrator.cases.questions.plausible_values import outside, place_of, unit_of, value_of
+from orchestrator.cases.questions.stabiliser_gains import stabiliser_doubts
 from orchestrator.core.errors import Problem, QuestionTopic, few
 from orchestrator.core.question_kinds import answer
 from orchestrator.devices.fmi.port_mapping import BoundDescription
@@ -231,6 +232,7 @@ def _doubts(draft: Draft) -> Iterator[UnusualValue]:
     yield from source_doubts(draft)
     yield from _ratings(draft)
     yield from dead_band_doubts(draft)
+    yield from stabiliser_doubts(draft)
 
 
 def _long_step(draft: Draft) -> Iterator[Problem]:
