@@ -32,7 +32,6 @@ from orchestrator.studies.points.failure import Failure
 from orchestrator.studies.points.task import Task, computed
 from orchestrator.studies.points.under_way import tell_part
 from orchestrator.studies.screening.modes import (
-    MOST_COUNTED,
     CriticalRegion,
     FoundModes,
     find_modes_here,
@@ -51,8 +50,8 @@ class StretchTask(Task):
     items: tuple[Item, ...]  # what is computed, in this order
     # whether growing eigenvalues are counted at all items, rather than at the ends
     whole: bool = False
-    # the same, where this takes little beside the rest of an item
-    few: bool = False
+    # number of states up to which the same is done, None if at any number
+    counted_to: int | None = 0
     sharing: SharingRule | None = None  # how units share an outage; as the case says where None
     # whether taps and switched shunts move after an outage, whatever the case says
     move_controls: bool = False
@@ -71,7 +70,7 @@ class StretchTask(Task):
                 said,
                 self.wanted,
                 self.whole,
-                self.few,
+                self.counted_to,
                 self.sharing,
                 self.move_controls,
                 self.runs,
@@ -308,7 +307,8 @@ class _Worker:
         linear = self._bench.linear_model()
         model, whole = linear.model, linear.components
         warnings = (*warnings, *linear.doubts)
-        count = count or (self._task.few and len(model.names) <= MOST_COUNTED)
+        most = self._task.counted_to
+        count = count or most is None or len(model.names) <= most
         own = self._own_eigenvalues(whole) if count else np.zeros(0, dtype=complex)
         found = find_modes_here(
             model,

@@ -644,20 +644,24 @@ def test_a_stretch_whose_end_fails_is_counted_at_its_last_point(
     assert {record.zeros for record in computed if record.counted} == {1}
 
 
-@pytest.mark.parametrize(("few", "between", "stable"), [(0, False, None), (500, True, True)])
+@pytest.mark.parametrize(
+    ("few", "fewest", "most", "between"),
+    [(0, 0, 4000, False), (500, 0, 4000, True), (500, 0, 5, False), (500, 24, 5, True)],
+)
 def test_growth_is_counted_everywhere_where_points_are_few(
-    few, between, stable, two_area, day, tmp_path, monkeypatch
+    few, fewest, most, between, two_area, day, tmp_path, monkeypatch
 ):
-    """Of many points those between the ends of a stretch are followed, and then no verdict is stable."""
+    """Of many points, fewer of a large system, those between a stretch's ends are followed: no verdict is stable."""
     monkeypatch.setattr(modes, "DENSE", 0)
-    monkeypatch.setattr(study, "FEW", few)
+    for name, value in {"FEW": few, "FEWEST": fewest, "MOST_COUNTED": most}.items():
+        monkeypatch.setattr(study, name, value)
     result = screened(
         plan_screening(two_area[0], ScreeningRequest(day, None, "gfor")), tmp_path / "points"
     )
     done = [item.record for item in result.items if item.record.status is Status.COMPUTED]
     assert len(done) == len(result.items) > 2
     assert [one.counted for one in done] == [True, *[between] * (len(done) - 2), True]
-    assert Summary(result).stable is stable
+    assert Summary(result).stable is (True if between else None)
 
 
 @pytest.mark.parametrize("clocks", [0, 1, 3, 7])
