@@ -4,6 +4,7 @@ from functools import partial
 
 from orchestrator.cases.case import Case
 from orchestrator.cases.form.definition import CaseDefinition
+from orchestrator.core.threads import one_thread
 from orchestrator.studies.coordinated_design.objective import Aim, RatedPoint
 from orchestrator.studies.coordinated_design.point import measure
 from orchestrator.studies.coordinated_design.search import SettingSearch
@@ -41,8 +42,9 @@ def search_settings(
         aims["searched for all modes"] = Aim((), request.least_damping)
     found = []
     for why, aim in aims.items():
-        search = SettingSearch(space, [RatedPoint(0, loops, aim, largest)])
-        best, _ = search.over_grid(search.best())
+        with one_thread():
+            search = SettingSearch(space, [RatedPoint(0, loops, aim, largest)])
+            best, _ = search.over_grid(search.best())
         found.append((why, space.group_settings(best.x)[0]))
     return found
 

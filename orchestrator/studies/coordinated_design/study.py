@@ -25,6 +25,7 @@ from orchestrator.core.asked import (
 )
 from orchestrator.core.errors import AnalysisError, InputError
 from orchestrator.core.options import Option
+from orchestrator.core.threads import one_thread
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.studies.coordinated_design.following import with_followed_names
 from orchestrator.studies.coordinated_design.objective import Aim, RatedPoint, worth_of_all
@@ -338,14 +339,15 @@ def design_over_points(plan: PointsDesignPlan, work: Work) -> PointsDesign:
     frequency = _frequency([before[k] for k in usable])
     largest = plan.request.gain_bounds[1]
     own = {place: largest for group in plan.groups for place in group.places}
-    rated = [
-        RatedPoint(k, loops, plan.aim, own)
-        for k in usable
-        if (loops := before[k].loops) is not None
-    ]
     space = SettingSpace(plan.groups, plan.request.gain_bounds, frequency)
-    search = SettingSearch(space, rated)
-    best = _search(search, plan)
+    with one_thread():  # thousands of small matrices, of which two threads take many times the time
+        rated = [
+            RatedPoint(k, loops, plan.aim, own)
+            for k in usable
+            if (loops := before[k].loops) is not None
+        ]
+        search = SettingSearch(space, rated)
+        best = _search(search, plan)
     settings, setting = tuple(space.group_settings(best.tried.x)), space.setting(best.tried.x)
     tell_doing("operating points with the controllers")
     then = replace(work, report=lambda n, of: work.report((of + 1) // 2 + n * (of // 2) // of, of))
@@ -357,9 +359,11 @@ def design_over_points(plan: PointsDesignPlan, work: Work) -> PointsDesign:
     if len(places) == 1 and not best.reached:  # the least gain is not the best
         known = _KnownDesign(places[0], settings[0], after)
     ranking = _ranking(plan, rated, frequency, before, known, work)
-    predicted = {
-        point.number: worth_of_all(point.loops, setting, plan.aim, point.apart) for point in rated
-    }
+    with one_thread():
+        predicted = {
+            point.number: worth_of_all(point.loops, setting, plan.aim, point.apart)
+            for point in rated
+        }
     where = [plan.read.of(item) for item in plan.read.items]
     points = judge_points(where, before, after, plan.aim, predicted, _apart(rated), setting=setting)
     return PointsDesign(
@@ -422,16 +426,17 @@ def _ranking(
     """The converters by what a controller there alone would give, computed anew with the setting of each."""
     largest = plan.request.gain_bounds[1]
     every = dict.fromkeys(plan.candidates, largest)
-    alike = [RatedPoint(point.number, point.loops, plan.aim, every) for point in rated]
-    alone = ranked(
-        plan.candidates,
-        _stages(plan),
-        points=alike,
-        largest=largest,
-        frequency=frequency,
-        most=plan.request.ranked,
-        known=None if known is None else (known.place, known.setting),
-    )
+    with one_thread():
+        alike = [RatedPoint(point.number, point.loops, plan.aim, every) for point in rated]
+        alone = ranked(
+            plan.candidates,
+            _stages(plan),
+            points=alike,
+            largest=largest,
+            frequency=frequency,
+            most=plan.request.ranked,
+            known=None if known is None else (known.place, known.setting),
+        )
     computed = {} if known is None else {known.place: known.points}
     apart, quietly = _apart(alike), replace(work, report=nobody)
     confirmed = []
