@@ -89,6 +89,7 @@ def test_exac3_holds_its_lowest_field_voltage():
         ("esac2a", {"V_FEMAX": 2.0}, "exciter.V_FEMAX must exceed"),
         ("esac3a", {"V_FEMAX": 2.0}, "exciter.V_FEMAX must exceed"),
         ("esac3a", {"V_AMAX": 0.1}, "exciter.V_AMAX"),
+        ("esac3a", {"V_EMIN": 5.0}, "exciter.V_EMIN"),
         ("esac2a", {"V_RMAX": 1.0}, "exciter.V_RMAX"),
         ("exac3", {"V_LV": 9.0, "K_LV": 1.0}, "exciter.V_LV: the operating point lies"),
     ],

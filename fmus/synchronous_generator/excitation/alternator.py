@@ -154,6 +154,11 @@ class Alternator:
     def _constant(self, V_E: Expr) -> Expr:
         return fmax(self.p.K_E + self.curve.part(V_E) / fmax(V_E, _LEAST), _LEAST)
 
+    def require_above(self, lowest: Expr) -> None:
+        """Require that the start does not lie below V_EMIN."""
+        names = ("exciter.V_EMIN", "exciter.V_EMIN")
+        require_within(self.m, self.V_E_0, lowest, _MOST, names)
+
     def drive(self, V_R: Expr, low: Scalar = 0.0, high: Scalar = _MOST) -> None:
         """Close V_E, driven by V_R, within its limits."""
         rate = (V_R - self.V_FE) / self.p.T_E
@@ -231,6 +236,7 @@ def ac8b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         control = Controller(m, p, PID_0, (p.V_PIDMIN, p.V_PIDMAX))
         PID = control(measured.error(control.error_at_start))
         V_R = limited_low_pass(m, "amplifier", p.K_A * PID, p.T_A, p.V_RMIN, p.V_RMAX, initial=V_R0)
+        behind.require_above(p.V_EMIN)
         highest = (p.V_FEMAX - behind.p.K_D * seen.I_fd) / behind.constant
         behind.drive(V_R, p.V_EMIN, fmax(highest, p.V_EMIN))
         return measured.close(behind.E_fd)

@@ -192,6 +192,7 @@ def ac7b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
             m, "second", rest, p.K_PA, p.K_IA, low=p.V_AMIN, high=p.V_AMAX, initial=V_A0
         )
         V_R = fmax(V_A * p.K_P * seen.terminal_voltage(behind.E_fd), -p.K_L * behind.V_FE)
+        behind.require_above(p.V_EMIN)
         highest = (p.V_FEMAX - behind.p.K_D * seen.I_fd) / behind.constant
         behind.drive(V_R, p.V_EMIN, fmax(highest, p.V_EMIN))
         return measured.close(behind.E_fd)

@@ -98,6 +98,7 @@ def esac3a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         V_A = limited_low_pass(
             m, "amplifier", p.K_A * rest, p.T_A, p.V_AMIN, p.V_AMAX, initial=V_A0
         )
+        behind.require_above(p.V_EMIN)
         _drive(m, behind, p.K_R * E_fd * V_A, p.V_FEMAX, p.V_EMIN)
         return measured.close(E_fd)
 

@@ -77,7 +77,7 @@ _LIMITS = "the lower limit exceeds the upper one; are the two swapped?"
 _EQUAL = "the limits are equal, so that nothing can move between them; correct one"
 LIMITS = (
     ("exciter.E_MAX", "exciter.E_MIN"),
-    *((f"exciter.V_{k}MAX", f"exciter.V_{k}MIN") for k in ("R", "A", "I", "M")),
+    *((f"exciter.V_{k}MAX", f"exciter.V_{k}MIN") for k in ("R", "A", "I", "M", "F")),
     *((f"governor.{q}_MAX", f"governor.{q}_MIN") for q in ("V", "P", "G")),
 )
 """Limits of a machine's controls, the upper one first."""
