@@ -30,7 +30,8 @@ def test_an_outage_without_any_verdict_is_told_by_its_first_point():
     why = (
         "line 9, power_flow: scenario 'base': power flow: no way leads to b1 from: 'b3'; close l23"
     )
-    lost = item(status=Status.POWER_FLOW, text=why)
+    cause = "power flow: no way leads to b1 from: 'b3'; close l23"
+    lost = item(status=Status.POWER_FLOW, text=why, cause=cause)
     table = view.overview(SimpleNamespace(result=SimpleNamespace(plan=plan, items=(lost,))))
     assert [column.cell(table.rows[0]) for column in table.columns] == [
         "sg2",
