@@ -2,7 +2,7 @@
 
 import cmath
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -154,6 +154,27 @@ class Confirmation:
         if self.beside is None or damping_ratio(self.beside) >= damping_ratio(self.reached):
             return None
         return self.beside
+
+
+def in_turn(
+    places: Sequence[str], confirm: Callable[[str], Confirmation], report: Callable[[int], None]
+) -> tuple[Confirmation, ...]:
+    """Confirm places one after another; an interrupt ends this, and what is confirmed by then stays.
+
+    ``report``: told how many are done."""
+    found: list[Confirmation] = []
+    with suppress(KeyboardInterrupt):
+        for place in places:
+            found.append(confirm(place))
+            report(len(found))
+    return tuple(found)
+
+
+def how_sure(sentences: Sequence[str], unconfirmed: Sequence[str]) -> list[str]:
+    """What coupled FMUs say of the places, and of which they say nothing as it was interrupted."""
+    if not unconfirmed:
+        return [*sentences] or ["not confirmed by coupled FMUs"]
+    return [*sentences, f"interrupted before coupled FMUs confirmed {', '.join(unconfirmed)}"]
 
 
 def confirmed(

@@ -14,7 +14,7 @@ from orchestrator.output.report.html.elements import document
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.points.code import code_hash
-from orchestrator.studies.siting.confirmation import Confirmation
+from orchestrator.studies.siting.confirmation import Confirmation, how_sure
 from orchestrator.studies.siting.machines import CONTROLLER, PART, MachineSites
 from orchestrator.studies.siting.place_ranking import PlaceRanking
 from orchestrator.studies.siting.view import (
@@ -107,7 +107,7 @@ def sureness(result: MachineSites) -> list[str]:
     unstable = result.found.stability.stable is False
     said = [f"UNSTABLE without a POD: {result.found.stability.because()}"] if unstable else []
     found = [_confirmed(result, one, before) for one in result.confirmations]
-    return [*said, *(found or ["not confirmed by coupled FMUs"])]
+    return [*said, *how_sure(found, result.unconfirmed)]
 
 
 def _confirmed(result: MachineSites, one: Confirmation, before: float) -> str:
@@ -169,6 +169,7 @@ def as_json(result: MachineSites) -> dict[str, Any]:
         "stabilised": list(result.stabilised),
         "left_out": list(result.without),
         "confirmed": [confirmation_json(one, "machine") for one in result.confirmations],
+        "unconfirmed": list(result.unconfirmed),
     }
 
 

@@ -21,6 +21,7 @@ from orchestrator.studies.pod_design.closed_loop import Placed, PodLoop, PodSett
 from orchestrator.studies.pod_design.lead_lag import NO_COMPENSATION
 from orchestrator.studies.siting.confirmation import (
     Confirmation,
+    in_turn,
     least_of,
     same_mode,
     trial_of,
@@ -75,6 +76,7 @@ class MachineSites:
     fixed: tuple[str, ...]
     without: tuple[str, ...]
     confirmations: tuple[Confirmation, ...] = ()
+    unconfirmed: tuple[str, ...] = ()  # machines before whose confirmation it was interrupted
 
     @property
     def prepared(self) -> PreparedScenario:
@@ -143,12 +145,14 @@ def find_machines(
         fixed=tuple(name for name in regulated if not _of_parts(plans[name])),
         without=tuple(name for name in machines if name not in regulated),
     )
-    confirmations, total = [], 1 + len(result.free[: request.confirm])
-    report(1, total)
-    for k, name in enumerate(result.free[: request.confirm]):
-        confirmations.append(_confirmed(result, name, scenario))
-        report(k + 2, total)
-    return replace(result, confirmations=tuple(confirmations))
+    best = tuple(result.free[: request.confirm])
+    report(1, 1 + len(best))
+    done = in_turn(
+        best,
+        lambda name: _confirmed(result, name, scenario),
+        lambda count: report(1 + count, 1 + len(best)),
+    )
+    return replace(result, confirmations=done, unconfirmed=best[len(done) :])
 
 
 def _of_parts(plan: ComponentPlan) -> bool:

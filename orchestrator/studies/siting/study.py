@@ -42,6 +42,7 @@ from orchestrator.studies.siting.confirmation import (
     Confirmation,
     SmallerDevice,
     confirmed,
+    in_turn,
     swings_outside,
 )
 from orchestrator.studies.siting.residues import (
@@ -178,6 +179,7 @@ class SiteResult:
     ranking: tuple[str, ...]
     not_judged: Mapping[str, str]
     confirmations: tuple[Confirmation, ...] = ()
+    unconfirmed: tuple[str, ...] = ()  # buses before whose confirmation it was interrupted
     terminals: tuple[str, ...] = ()  # buses of units that were left out, as nobody asked for them
 
     @property
@@ -242,7 +244,7 @@ def find_sites(
     if opening:
         open_case = replace(open_case, line_ends=opening)
         preparation = ItemPreparation(open_case, scenario, request.layers, request.step_size)
-    total = len(outages) + request.confirm
+    total = len(outages) + min(request.confirm, len(buses))
     asked = BusesAsked(frozenset(buses), bool(request.buses), request.is_foreign)
     situations, not_judged = [], dict[str, str]()
     for k, outage in enumerate(outages):
@@ -399,7 +401,6 @@ def _with_confirmations(
             result.prepared, request.rating or placing.OURS_MVA, request.controller
         )
     )
-    found = []
     outside = swings_outside(result.intact.found) if request.confirm else []
 
     def with_device(bus: str, device: ComponentTable) -> Confirmation:
@@ -414,13 +415,15 @@ def _with_confirmations(
             outside=outside,
         )
 
-    for k, bus in enumerate(result.ranking[: request.confirm]):
+    def confirm(bus: str) -> Confirmation:
         one = with_device(bus, device)
-        if not (one.agrees or one.failure or request.is_foreign):
-            one = replace(one, smaller=_smaller_device(result, bus, with_device))
-        found.append(one)
-        report(k + 1)
-    result = replace(result, confirmations=tuple(found))
+        if one.agrees or one.failure or request.is_foreign:
+            return one
+        return replace(one, smaller=_smaller_device(result, bus, with_device))
+
+    best = result.ranking[: request.confirm]
+    found = in_turn(best, confirm, report)
+    result = replace(result, confirmations=found, unconfirmed=best[len(found) :])
     return _by_coupled(result) if result.by_coupled else result
 
 

@@ -20,7 +20,7 @@ from orchestrator.output.report.short_texts import share_text
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.points.code import code_hash
-from orchestrator.studies.siting.confirmation import Confirmation, SmallerDevice
+from orchestrator.studies.siting.confirmation import Confirmation, SmallerDevice, how_sure
 from orchestrator.studies.siting.place_ranking import PlaceRanking
 from orchestrator.studies.siting.placing import ACTIVE, OURS_MVA, REACTIVE
 from orchestrator.studies.siting.residues import SeenMode, Situation
@@ -261,7 +261,7 @@ def _called(seen: SeenMode) -> str:
 def sureness(result: SiteResult) -> list[str]:
     before = result.intact.modes[0].mode.damping_percent
     found = [_confirmed(result, one, before) for one in result.confirmations]
-    return [*_unstable(result), *(found or ["not confirmed by coupled FMUs"])]
+    return [*_unstable(result), *how_sure(found, result.unconfirmed)]
 
 
 def _unstable(result: SiteResult) -> list[str]:
@@ -463,6 +463,7 @@ def as_json(result: SiteResult) -> dict[str, Any]:
         "outages": [_outage_json(result, at) for at in result.worst_first if at.name != here],
         "not_judged": dict(result.not_judged),
         "confirmed": list(map(confirmation_json, result.confirmations)),
+        "unconfirmed": list(result.unconfirmed),
     }
 
 
