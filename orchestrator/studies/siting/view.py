@@ -412,8 +412,12 @@ def _not_judged(result: SiteResult) -> list[str]:
 
 
 def open_points(result: SiteResult) -> list[str]:
-    """Modes and outages that the study did not judge, each with the reason."""
-    return [*_swings_beyond(result), *_outages_without(result)]
+    """Modes, outages and places that the study did not judge, each with the reason."""
+    return [
+        *_swings_beyond(result),
+        *_outages_without(result),
+        *(f"{bus}: interrupted before coupled FMUs confirmed it" for bus in result.unconfirmed),
+    ]
 
 
 def _swings_beyond(result: SiteResult) -> list[str]:

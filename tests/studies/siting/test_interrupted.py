@@ -40,4 +40,6 @@ def test_the_ranking_is_told_if_its_confirmation_is_interrupted(monkeypatch):
     assert found.ranking == whole.ranking
     assert found.as_json()["unconfirmed"] == [*found.ranking]
     assert any(text.startswith("interrupted before") for text in found.remarks)
+    unjudged = f"{found.ranking[1]}: interrupted before coupled FMUs confirmed it"
+    assert found.as_json()["open_points"][-1] == unjudged
     assert found.answer == whole.answer
