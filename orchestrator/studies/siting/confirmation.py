@@ -171,7 +171,7 @@ def in_turn(
 
 
 def how_sure(sentences: Sequence[str], unconfirmed: Sequence[str]) -> list[str]:
-    """What coupled FMUs say of the places, and of which they say nothing as it was interrupted."""
+    """Say what coupled FMUs found at the places, and before which of them it was interrupted."""
     if not unconfirmed:
         return [*sentences] or ["not confirmed by coupled FMUs"]
     return [*sentences, f"interrupted before coupled FMUs confirmed {', '.join(unconfirmed)}"]
