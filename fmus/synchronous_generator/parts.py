@@ -8,11 +8,12 @@ from typing import Any
 from fmus.synchronous_generator.excitation.alternator import ac8b, esac6a, exac2, exbas
 from fmus.synchronous_generator.excitation.bridge import st5b, st6b, st7b, st8c
 from fmus.synchronous_generator.excitation.common import Exciter
-from fmus.synchronous_generator.excitation.compound import esst2a, esst3a, exst3, ieeet3
+from fmus.synchronous_generator.excitation.compound import esst2a, esst3a, exst2, exst3, ieeet3
 from fmus.synchronous_generator.excitation.integral import ac7b, dc4b, expic1
 from fmus.synchronous_generator.excitation.limited_alternator import esac2a, esac3a, exac3
 from fmus.synchronous_generator.excitation.nve import exni
 from fmus.synchronous_generator.excitation.rexsys import rexsys
+from fmus.synchronous_generator.excitation.rheostat import ieeet4, ieeet5
 from fmus.synchronous_generator.excitation.rotating import (
     ac1a,
     ac4a,
@@ -110,8 +111,11 @@ EXCITERS: dict[str, Exciter] = {
     "exbas": exbas,
     "rexsys": rexsys,
     "ieeet3": ieeet3,
+    "ieeet4": ieeet4,
+    "ieeet5": ieeet5,
     "st1a": st1a,
     "esst2a": esst2a,
+    "exst2": exst2,
     "esst3a": esst3a,
     "exst3": exst3,
     "st4b": st4b,

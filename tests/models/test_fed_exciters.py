@@ -24,6 +24,7 @@ EXCITERS = {
     | {"K_E": 1.0, "T_E": 0.8, "K_C": 0.1, "K_D": 0.3},
     "ieeet3": AMPLIFIER | FEEDBACK | WIDE | {"K_P": 3.0, "K_I": 1.2, "K_E": 0.8, "T_E": 0.5},
     "esst2a": AMPLIFIER | FEEDBACK | WIDE | TURNED | {"K_E": 0.9, "T_E": 0.5},
+    "exst2": AMPLIFIER | FEEDBACK | WIDE | SOURCE | {"K_E": 0.9, "T_E": 0.5},
     "esst3a": AMPLIFIER
     | TURNED
     | {"T_C": 1.0, "T_B": 6.0, "K_M": 7.0, "T_M": 0.4, "K_G": 0.6}
@@ -74,12 +75,14 @@ def by_hand(name, p, s):
             forward *= (p["K_PR"] + p["K_IR"] / s) * lead(p, s, "T_C", "T_B")
             field, back = behind_the_rectifier(p), lead(p, s, "T_F1", "T_F2")
         return forward / (1 + forward * rate(p, s) * back) / (field + s * p["T_E"]), 0.0
-    if name in ("ieeet3", "esst2a"):
-        times = 1.0 if name == "ieeet3" else available(p, V_T)
+    if name in ("ieeet3", "esst2a", "exst2"):
+        times = available(p, V_T) if name == "esst2a" else 1.0
         forward = p["K_A"] / (1 + s * p["T_A"]) * times
         whole = p["K_E"] + s * p["T_E"] + forward * rate(p, s)
         if name == "ieeet3":
             return forward / whole, slope(lambda v: behind_reactance(p, v), V_T) / whole
+        if name == "exst2":
+            return forward / whole, slope(lambda v: available(p, v), V_T) / whole
         V_A = p["K_E"] * E_FD / times
         return forward / whole, V_A * slope(lambda v: available(p, v), V_T) / whole
     if name == "esst3a":
@@ -117,15 +120,13 @@ def test_an_exciter_is_its_block_diagram(name, hertz):
     assert response["E_fd", "v_t"] == pytest.approx(direct - wanted * measured, rel=1e-5)
 
 
-@pytest.mark.parametrize("name", ["ieeet3", "esst2a", "st8c"])
+@pytest.mark.parametrize("name", ["ieeet3", "esst2a", "exst2", "st8c"])
 def test_a_stator_current_compounds_the_source(name):
     """Without the stator's current the same field voltage needs more of the regulator."""
     with_current = exciter(name, EXCITERS[name])
     without = exciter(
         name,
-        EXCITERS[name] | {"K_I": 0.0, "X_L": 0.0}
-        if name != "ieeet3"
-        else EXCITERS[name] | {"K_I": 0.0},
+        EXCITERS[name] | {"K_I": 0.0} | ({"X_L": 0.0} if "X_L" in EXCITERS[name] else {}),
     )
     amplifier = "exciter.bridge" if name == "st8c" else "exciter.amplifier"
     assert without.states[amplifier] > with_current.states[amplifier] * 1.01
@@ -229,6 +230,19 @@ LIMITS = {
         0.8 * 5.0 * V_T,
         0.2 * 5.0 * V_T,
     ),
+    "esst2a, V_B": (
+        "esst2a",
+        PLAIN | {"K_P": 9.0, "E_FDMAX": 30.0, "T_E": 0.2},
+        1.2 * 9.0 * V_T,
+        0.0,
+    ),
+    "exst2, V_R": (
+        "exst2",
+        {"K_P": 3.0, "K_I": 0.0, "K_C": 0.0, "V_RMAX": 1.5, "V_RMIN": -1.5, "T_E": 0.2},
+        1.5 + 3.0 * V_T,
+        -1.5 + 3.0 * V_T,
+    ),
+    "exst2, E_fd": ("exst2", {"K_P": 1.0, "V_RMAX": 9.0, "V_RMIN": -9.0, "T_E": 0.2}, 5.0, 0.0),
     "esst2a, E_fd": ("esst2a", PLAIN | {"E_FDMAX": 3.5, "T_E": 0.2}, 3.5, 0.0),
     "esst3a, V_M": (
         "esst3a",

@@ -267,6 +267,25 @@ class ExciterSaturation:
         return saturation.saturated_part(E, *self._points)
 
 
+_SHARE_AT_START = 0.1
+"""V_R of the start over V_RMAX, for which a program chooses K_E where the data have none."""
+
+
+def constant_of_field(
+    m: ModelBuilder, K_E: Expr, high: Expr, curve: "ExciterSaturation", E_0: Expr
+) -> Expr:
+    """K_E as it is given, or so that V_R of the operating point is a tenth of its upper limit.
+
+    ``K_E``: as it is given [pu]; ``high``: upper limit of V_R; ``E_0``: field voltage of the operating point."""
+    chosen = m.switch(
+        "K_E_of_start",
+        False,
+        "K_E is such that V_R starts at a tenth of V_RMAX, as PSS/E has it for K_E = 0",
+    )
+    of_start = (_SHARE_AT_START * high - curve.part(E_0)) / E_0
+    return if_else(chosen, of_start, K_E)
+
+
 def rectifier(I_N: Expr) -> Expr:
     """F_EX(I_N) of a rectifier bridge (IEEE 421.5, annex D), I_N = K_C·I_FD/V_E."""
     middle = sqrt(fmax(0.75 - I_N**2, 0))

@@ -1,9 +1,11 @@
-"""ESST2A, ESST3A, EXST3 and IEEET3: exciters fed by the terminal's voltage and, compounded, by the stator's current.
+"""ESST2A, EXST2, ESST3A, EXST3 and IEEET3: exciters fed by the terminal's voltage, and compounded by its current.
 
 ESST2A has an exciter of first order between the regulator and the field:
 
     V_ref + V_S − v_m − V_F → K_A/(1+sT_A) = V_A, held within V_RMIN and V_RMAX
     T_E·dE_fd/dt = V_A·V_B − K_E·E_fd, 0 ≤ E_fd ≤ E_FDMAX,  V_F = s·K_F/(1+sT_F)·E_fd
+
+EXST2, of 1979, adds its source to the regulator's voltage, V_A + V_B, and does not multiply both.
 
 ESST3A has an inner regulator of the field voltage:
 
@@ -22,7 +24,9 @@ IEEET3 adds the regulator's voltage to that of the source, behind a commutating 
     T_E·dE_fd/dt = V_B − K_E·E_fd,  V_F = s·K_F/(1+sT_F)·E_fd
 
 V_E and V_B are those of `sources`. Sources: OpenIPSL at 2be0558a (ESST2A), ANDES 2.0.0 (ESST3A, IEEET3), Opal-RT's
-library of phasor models at 6dc8ca5 (ESST3A, IEEET3) and cba975b8 (EXST3), IEEE 421.5."""
+library of phasor models at 6dc8ca5 (ESST3A, IEEET3) and cba975b8 (EXST3), InterPSS' `Exst2Exciter`, IEEE 421.5."""
+
+from functools import partial
 
 from fmus.synchronous_generator.data_lines import Given, declared, pu, seconds
 from fmus.synchronous_generator.excitation.common import (
@@ -92,13 +96,20 @@ def _amplifier(m: ModelBuilder, p: Given, error: Expr, initial: Expr) -> Expr:
     return limited_low_pass(m, "amplifier", signal, p.T_A, p.V_RMIN, p.V_RMAX, initial=initial)
 
 
-def esst2a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare the exciter and return (E_fd, |v_t|) [pu]."""
+def esst2a(m: ModelBuilder, seen: Regulated, *, adds: bool = False) -> tuple[Expr, Expr]:
+    """Declare the exciter and return (E_fd, |v_t|) [pu].
+
+    ``adds``: whether it is EXST2, which adds its source to the regulator's voltage."""
     with m.scope("exciter"):
-        p, source = declared(m, (*REGULATOR, *EXCITER), SOURCE), compound_source(m, seen, 4.88, 0.3)
+        p = declared(m, (*REGULATOR, *EXCITER), SOURCE)
+        lines = (*(COMPOUND[:2] if adds else COMPOUND), LOADED[0])
+        source = Source(
+            declared(m, lines, SOURCE, {"K_P": 2.0 if adds else 4.88, "K_C": 0.3}), seen
+        )
         high = declared(m, (pu("E_FDMAX", 5.0, "Highest field voltage"),), SOURCE).E_FDMAX
         E_0 = seen.start.E_fd
-        V_A0 = p.K_E * E_0 / source.at_start
+        drive_0, V_B0 = p.K_E * E_0, source.at_start
+        V_A0 = drive_0 - V_B0 if adds else drive_0 / V_B0
         require_within(m, V_A0, p.V_RMIN, p.V_RMAX, ("exciter.V_RMIN", "exciter.V_RMAX"))
         require_within(m, E_0, 0.0, high, ("exciter.E_FDMAX", "exciter.E_FDMAX"))
         x = m.state("E", E_0, "pu", "Field voltage", base="E_fd")
@@ -107,9 +118,14 @@ def esst2a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         measured = Measurement(m, seen)
         error = seen.lifted(measured.error(V_A0 / p.K_A) - V_F, BEFORE, V_A0 / p.K_A)
         V_A = _amplifier(m, p, error, V_A0)
-        rate = (V_A * source.available(seen.terminal(E_fd)) - p.K_E * E_fd) / p.T_E
+        V_B = source.available(seen.terminal(E_fd))
+        drive = V_A + V_B if adds else V_A * V_B
+        rate = (drive - p.K_E * E_fd) / p.T_E
         m.derivative(x, held_at_limits(x, rate, 0, high))
         return measured.close(E_fd)
+
+
+exst2 = partial(esst2a, adds=True)
 
 
 def esst3a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:

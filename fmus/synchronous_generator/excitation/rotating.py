@@ -33,9 +33,9 @@ from functools import partial
 from fmus.synchronous_generator.excitation.common import (
     BEFORE,
     BEHIND,
-    ExciterSaturation,
     Measurement,
     Regulated,
+    constant_of_field,
     exciter_saturation,
     gain,
     lead_lag_stage,
@@ -77,7 +77,7 @@ def dc1a(
         given_K_E = gain(m, "K_E", 1.0, "Field resistance, separately excited")
         T_E = time(m, "T_E", 0.314, "Exciter's field", 1e-3)
         curve = exciter_saturation(m, 3.0, 0.41, 4.0, 1.96)
-        K_E = _constant(m, given_K_E, high, curve, seen.start.E_fd)
+        K_E = constant_of_field(m, given_K_E, high, curve, seen.start.E_fd)
         V_R0 = K_E * seen.start.E_fd + curve.part(seen.start.E_fd)
         v_0 = seen.start.v_t if bus_fed else Expr(1)
         require_within(m, V_R0, v_0 * low, v_0 * high, ("exciter.V_RMIN", "exciter.V_RMAX"))
@@ -112,7 +112,7 @@ def ieeet2(
         given_K_E = gain(m, "K_E", 1.0, "Field resistance, separately excited")
         T_E = time(m, "T_E", 0.55, "Exciter's field", 1e-3)
         curve = exciter_saturation(m, 2.85, 0.3, 3.8, 0.6)
-        K_E = _constant(m, given_K_E, high, curve, seen.start.E_fd)
+        K_E = constant_of_field(m, given_K_E, high, curve, seen.start.E_fd)
         V_R0 = K_E * seen.start.E_fd + curve.part(seen.start.E_fd)
         require_within(m, V_R0, low, high, ("exciter.V_RMIN", "exciter.V_RMAX"))
         E = m.state("E", seen.start.E_fd, "pu", "Field voltage", base="E_fd")
@@ -140,23 +140,6 @@ def ieeet2(
 
 ieeex2 = partial(ieeet2, compensated=True)  # IEEET2 with DC1A's lead and lag
 ac5a = partial(ieeet2, alternator=True)  # IEEET2 with a lead in its feedback, and E_fd >= 0
-
-
-_SHARE_AT_START = 0.1
-"""V_R of the start over V_RMAX, for which a program chooses K_E where the data have none."""
-
-
-def _constant(m: ModelBuilder, K_E: Expr, high: Expr, curve: ExciterSaturation, E_0: Expr) -> Expr:
-    """K_E as it is given, or so that V_R of the operating point is a tenth of its upper limit.
-
-    ``K_E``: as it is given [pu]; ``high``: upper limit of V_R; ``E_0``: field voltage of the operating point."""
-    chosen = m.switch(
-        "K_E_of_start",
-        False,
-        "K_E is such that V_R starts at a tenth of V_RMAX, as PSS/E has it for K_E = 0",
-    )
-    of_start = (_SHARE_AT_START * high - curve.part(E_0)) / E_0
-    return if_else(chosen, of_start, K_E)
 
 
 def ac1a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
