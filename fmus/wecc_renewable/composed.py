@@ -6,11 +6,11 @@ from dataclasses import replace
 from fmus.toolchain.model import Model
 from fmus.wecc_renewable.behind_impedance import REGCB1, REGCC1
 from fmus.wecc_renewable.converters import REGCA1, Kind
-from fmus.wecc_renewable.dyr_records import AT_A_UNIT, ELSEWHERE
+from fmus.wecc_renewable.dyr_records import AT_A_UNIT, ELSEWHERE, PITCH_OF_TYPE_3, TYPE_3
 from fmus.wecc_renewable.electrical import Reeca1
 from fmus.wecc_renewable.electrical_blocking import Reecd1
 from fmus.wecc_renewable.electrical_storage import Reecc1
-from fmus.wecc_renewable.model import Makeup, composed
+from fmus.wecc_renewable.model import Makeup, composed, type_3
 from fmus.wecc_renewable.turbine import TurbineParts
 
 CONVERTERS: dict[str, Kind] = {"REGCA1": REGCA1, "REGCB1": REGCB1, "REGCC1": REGCC1}
@@ -33,7 +33,8 @@ def wecc_plant_phasor(records: str = "REGCC1 REECD1") -> Model:
     records
         PSS/E's names of its records, in any order: one of `CONVERTERS` and one of `CONTROLS`; REPCA1, with the word
         ``elsewhere`` if it measures at another point of the network, or one of `AT_A_UNIT`, if a component of
-        `plant_controller_phasor` sets the references of several units; WTDTA1, and with it some of `ON_SHAFT`.
+        `plant_controller_phasor` sets the references of several units; WTDTA1, and with it some of `ON_SHAFT`. Or those
+        of `TYPE_3`, the first generation, with WT3P1 or without.
 
     Raises
     ------
@@ -41,6 +42,8 @@ def wecc_plant_phasor(records: str = "REGCC1 REECD1") -> Model:
         If a name is none of these, a kind lacks, or there are two of one kind.
     """
     given = records.split()
+    if {*given} & {*TYPE_3, PITCH_OF_TYPE_3}:
+        return _type_3(records)
     converter = _one_of("converter", CONVERTERS, given)
     control = _one_of("control", CONTROLS, given)
     known = {*CONVERTERS, *CONTROLS, PLANT, ELSEWHERE, *AT_A_UNIT, SHAFT, *ON_SHAFT}
@@ -68,6 +71,20 @@ def wecc_plant_phasor(records: str = "REGCC1 REECD1") -> Model:
     name = "_".join(["wecc_plant", *(n.lower() for n in (converter, control, *rest)), "phasor"])
     title = f"Plant of {', '.join(n for n in (converter, control, *rest) if n != ELSEWHERE)}"
     return replace(composed(name, f"{title} (phasor type)", makeup), of_parts=True)
+
+
+def _type_3(records: str) -> Model:
+    """The turbine of type 3 of the first generation."""
+    given, all_there = records.split(), {*TYPE_3, PITCH_OF_TYPE_3}
+    if not {*TYPE_3} <= {*given} <= all_there or len({*given}) < len(given):
+        raise ValueError(
+            f"records = {records!r}: {' '.join(TYPE_3)} go together, with {PITCH_OF_TYPE_3} or without, and nothing "
+            "else beside them"
+        )
+    names = [name for name in (*TYPE_3, PITCH_OF_TYPE_3) if name in given]
+    name = "_".join(["wecc_plant", *(n.lower() for n in names), "phasor"])
+    title = f"Wind turbine of {', '.join(names)} (phasor type)"
+    return replace(type_3(name, title, has_pitch=PITCH_OF_TYPE_3 in names), of_parts=True)
 
 
 def _one_of(kind: str, choices: Mapping[str, object], given: list[str]) -> str:

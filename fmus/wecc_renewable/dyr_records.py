@@ -26,3 +26,9 @@ CONTROLLER_RECORD = _RECORDS[CONTROLLER]
 
 AT_A_UNIT = ("REAX3BU1", "REAX4BU1")
 """Its parts at units, as records of these."""
+
+TYPE_3 = ("WT3G1", "WT3E1", "WT3T1")
+"""Records of a turbine of type 3 of the first generation, which go together: converter, control and shaft."""
+
+PITCH_OF_TYPE_3 = "WT3P1"
+"""Its pitch control, which may lack."""

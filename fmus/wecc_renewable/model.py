@@ -26,6 +26,7 @@ from fmus.wecc_renewable.plant import Measured, measured_elsewhere, plant_refere
 from fmus.wecc_renewable.several_units import references_by_plant
 from fmus.wecc_renewable.signals import References, Terminal
 from fmus.wecc_renewable.turbine import Turbine, TurbineParts
+from fmus.wecc_renewable.type_3 import Wt3, Wt3g1, port_of_machine
 
 S_N = 100.0  # default rating [MVA]: the base of networks
 P_0 = 0.8  # default power [pu, S_n]
@@ -116,17 +117,35 @@ def composed(name: str, title: str, makeup: Makeup) -> Model:
     return m.build()
 
 
-def _declared(
-    m: ModelBuilder,
-    port: DevicePort,
-    seen: ExtrapolatedVoltage,
-    converter: Converter,
-    makeup: Makeup,
-    rating: Expr,
-) -> _Plant:
+def type_3(name: str, title: str, *, has_pitch: bool) -> Model:
+    """The turbine of WT3G1, WT3E1 and WT3T1, with WT3P1 or without."""
+    m = phasor_builder(name, title, kind="converter", usual=USUAL)
+    S_n = declare_rating(m, S_N)
+    port = device_port_of(m, S_n, P_0)
+    Z = port_of_machine(m)
+    master = declare_master_step(m)
+    seen = extrapolated_voltage(m, port, master)
+    seen.follow(m, port.v)
+    converter = Wt3g1(m, port, seen, Z, S_n)
+    turbine = Wt3(m, _terminal(port, seen, converter), converter, has_pitch=has_pitch)
+    active, emf = turbine.close(m)
+    converter.follow(m, active, emf)
+    declare_phasor_outputs(m, port, converter.emf(m, master), Z)
+    fed = converter.fed()
+    m.output("V", seen.value.magnitude(), "pu", "Voltage magnitude at the terminal", base="bus")
+    m.output("I_p_fed", fed[0], "pu", "Active current", base="S_n")
+    m.output("I_q_fed", fed[1], "pu", "Reactive current", base="S_n")
+    m.output("I_p_command", active, "pu", "Command of active current", base="S_n")
+    m.output("E_q_command", emf, "pu", "Command of the emf", base="bus")
+    turbine.declare_outputs(m)
+    return m.build()
+
+
+def _terminal(port: DevicePort, seen: ExtrapolatedVoltage, converter: Converter) -> Terminal:
+    """The terminal as a plant's controls see it."""
     v = seen.value
     s_0, s = power(port.v_0, port.i_0), power(v, converter.current)
-    terminal = Terminal(
+    return Terminal(
         v=v,
         i=converter.current,
         size=v.magnitude(),
@@ -138,6 +157,17 @@ def _declared(
         P_0=s_0.re,
         Q_0=s_0.im,
     )
+
+
+def _declared(
+    m: ModelBuilder,
+    port: DevicePort,
+    seen: ExtrapolatedVoltage,
+    converter: Converter,
+    makeup: Makeup,
+    rating: Expr,
+) -> _Plant:
+    terminal = _terminal(port, seen, converter)
     parts = makeup.turbine
     turbine = None if parts is None else Turbine(m, terminal, parts, rating)
     with m.scope("electrical"):

@@ -80,6 +80,7 @@ MODELS = {
             "REGCB1 REECD1 REPCA1 elsewhere",
             "REGCA1 REECA1 WTDTA1 WTARA1 WTPTA1 WTTQA1",
             "REGCB1 REECC1 REAX4BU1",
+            "WT3G1 WT3E1 WT3T1 WT3P1",
         )
     },
     **{f"exciter {name}": partial(exciter, name) for name in EXCITERS},

@@ -141,7 +141,7 @@ def _refuse_what_lacks(
         accounted |= {*bare}
     recorded = {key for key, own in found.records.items() if own}
     powers = {key: machine.p_mw for key, machine in found.machines.items()}
-    unfit = records_unfit(found.parts, accounted, found.labels, recorded, powers)
+    unfit = records_unfit(found.parts, accounted, found.labels, recorded, powers, found.names)
     with_shafts = going_with_shafts(found.unread, found.records)
     problems = [*(slips(strange) if bare else ()), *problems, *with_shafts, *unfit]
     if not problems and not missing:

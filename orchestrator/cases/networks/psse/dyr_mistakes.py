@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
 from fmus.grid_following.dyr_approximation import FIELDS, MODEL
-from fmus.wecc_renewable.dyr_records import PLANT_RECORDS
+from fmus.wecc_renewable.dyr_records import PITCH_OF_TYPE_3, PLANT_RECORDS, TYPE_3
 from orchestrator.cases.form.remedies import (
     APPROXIMATING,
     replacement_of,
@@ -46,13 +46,17 @@ def records_unfit(
     labels: Mapping[tuple[int, str], str],
     recorded: Collection[tuple[int, str]],
     powers: Mapping[tuple[int, str], float],
+    names: Mapping[tuple[int, str], Mapping[str, str]],
 ) -> Iterator[str]:
     """Machines whose records are too many or too few.
 
-    ``labels``: of their units; ``recorded``: machines that have records at all; ``powers``: of all machines [MW]."""
+    ``labels``: of their units; ``recorded``: machines that have records at all; ``powers``: of all machines [MW];
+    ``names``: PSS/E's of the records, by the kind of part."""
     for (bus, name), own in parts.items():
         if (bus, name) not in replaced:
-            yield from _incomplete(f"machine {name!r} at bus {bus}", own, labels[bus, name])
+            machine, unit = f"machine {name!r} at bus {bus}", labels[bus, name]
+            of_type_3 = [*_of_type_3(machine, {*names[bus, name].values()}, unit)]
+            yield from of_type_3 or _incomplete(machine, own, unit)
         others = ", ".join(kind for kind in own if kind not in KINDS_OF_CONVERTERS)
         if "converter" in own and others:
             yield f"machine {name!r} at bus {bus} is a converter, and has records of its {others}; remove them"
@@ -106,7 +110,7 @@ def _incomplete(machine: str, own: Mapping[str, str], unit: str) -> Iterator[str
     beside = {*KINDS_OF_CONVERTERS} - {"converter", "electrical"}
     lonely = [kind for kind in ON_SHAFT if kind in own and "shaft" not in own]
     if lonely:
-        named = [name for name, record in PLANT_RECORDS.items() if record.kind in lonely]
+        named = [name for name in _second_generation() if PLANT_RECORDS[name].kind in lonely]
         yield (
             f"{machine} has records of a wind turbine's {few(lonely, _NAMED)} and no WTDTA1, its shaft; add it, or "
             f"write {without_models(named)}, and the shaft turns at rated speed"
@@ -115,12 +119,30 @@ def _incomplete(machine: str, own: Mapping[str, str], unit: str) -> Iterator[str
         return
     there = " and ".join(kind for kind in KINDS_OF_CONVERTERS if kind in own)
     wanted = "electrical" if needs else "converter"
-    *first, last = (name for name, record in PLANT_RECORDS.items() if record.kind == wanted)
+    *first, last = (name for name in _second_generation() if PLANT_RECORDS[name].kind == wanted)
     missing = f"{', '.join(first)} or {last}"
     yield (
         f"{machine} has records of its {there} and no {missing}: together they are a plant of WECC's generic models; "
         f"add it, or write {replacement_of(unit)}, and a converter of ours stands there"
     )
+
+
+def _second_generation() -> list[str]:
+    """Records of plants that are of no turbine of the first generation."""
+    return [name for name in PLANT_RECORDS if name not in (*TYPE_3, PITCH_OF_TYPE_3)]
+
+
+def _of_type_3(machine: str, names: Collection[str], unit: str) -> Iterator[str]:
+    """Yield what is wrong with the records of a turbine of type 3 of the first generation."""
+    own = {*names} & {*TYPE_3, PITCH_OF_TYPE_3}
+    others = ({*names} & {*PLANT_RECORDS}) - own
+    if own and (others or not {*TYPE_3} <= own):
+        *first, last = TYPE_3
+        yield (
+            f"{machine} has records {', '.join(sorted(own | others))}: {', '.join(first)} and {last} go together, with "
+            f"{PITCH_OF_TYPE_3} or without it, and with no other record of a plant; correct them, or write "
+            f"{replacement_of(unit)}, and a converter of ours stands there"
+        )
 
 
 def going_with_shafts(

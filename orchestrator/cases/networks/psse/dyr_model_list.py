@@ -19,8 +19,10 @@ from fmus.toolchain.dyr_form import DyrRecord
 from fmus.wecc_renewable.dyr_records import (
     CONTROLLER,
     CONTROLLER_RECORD,
+    PITCH_OF_TYPE_3,
     PLANT_RECORDS,
     SAME_RECORDS,
+    TYPE_3,
 )
 from orchestrator.cases.networks.psse.air_conditioners import AIR_CONDITIONERS
 from orchestrator.cases.networks.psse.composite_loads import COMPOSITE_NAMES
@@ -65,6 +67,7 @@ _MOTORS = "PowerWorld's guide to PSS/E's load models, and STEPS' reader"
 _GENERIC = (
     "WECC's generic converters: fields as ANDES and GridPACK read them, diagrams of WECC's guide"
 )
+_OF_TYPE_3 = "WECC's first generic turbine of type 3: fields and diagrams as InterPSS has them"
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +132,8 @@ def _of_machines() -> Iterator[KnownRecord]:
 
 def _of_plants() -> Iterator[KnownRecord]:
     for name, record in PLANT_RECORDS.items():
-        own = KnownRecord(name, _KINDS[record.kind], record.part, _GENERIC, _of_plant(name))
+        source = _OF_TYPE_3 if name in (*TYPE_3, PITCH_OF_TYPE_3) else _GENERIC
+        own = KnownRecord(name, _KINDS[record.kind], record.part, source, _of_plant(name))
         yield own
         yield from (replace(own, name=x) for x, same in SAME_RECORDS.items() if same == name)
 

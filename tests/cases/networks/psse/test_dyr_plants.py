@@ -224,7 +224,15 @@ WIND = (
     "3 'WTPTA1' 1 25 150 30 3 0 0.3 27 0 10 -10 /\n",
     "3 'WTTQA1' 1 0 3 0.6 0.05 60 1.2 0 0.2 0.58 0.4 0.72 0.6 0.86 0.8 1 0 /\n",
 )
+TYPE_3 = (
+    "3 'WT3G1' 1 74 0.8 30 0 0.1 1.5 /\n",
+    "3 'WT3E1' 1 0 1 1 0 0 '0' 0.15 18 5 0 0.05 3 0.6 1.12 0.04 0.436 -0.436 1.1 0.02 0.45 -0.45 5 0.1 0.9 1.1 40 "
+    "-0.5 0.4 0.05 0.05 1 0.69 0.78 0.98 1.12 0.74 1.2 /\n",
+    "3 'WT3T1' 1 1.0 4.94 0 0.007 21.98 0.875 1.8 1.5 /\n",
+    "3 'WT3P1' 1 0.3 150 25 3 30 0 27 10 1 /\n",
+)
 MADE = {
+    "WT3G1 WT3E1 WT3T1 WT3P1": TYPE_3,
     "REGCB1 REECC1": (line("REGCB1", EMF), line("REECC1", BATTERY)),
     "REGCC1 REECD1 REPCA1": (line("REGCC1", LOOP), line("REECD1", TYPE_D), PLANT.format("1")),
     "REGCA1 REECC1 REPCA1 elsewhere": (
@@ -246,10 +254,13 @@ def test_other_records_are_one_plant(records, prepared):
     made = "_".join(records.lower().split())
     assert plan.description.model_name == f"wecc_plant_{made}_phasor"
     given = plan.parameters
-    if "REGCA1" not in records:  # ZSORCE of the network data
+    if records.startswith(("REGCB1", "REGCC1")):  # ZSORCE of the network data
         assert (given["Re"], given["Xe"]) == (0.0, 0.2)
     if "REECC1" in records:
         assert (given["electrical.SOCini"], given["electrical.T"]) == (0.4, 3600.0)
+    if "WT3G1" in records:
+        assert (given["turbines"], given["Xeq"], given["electrical.wP100"]) == (74, 0.8, 1.2)
+        assert (given["shaft.Htfrac"], given["pitch.PMX"]) == (0.875, 1)
     if "WTTQA1" in records:
         assert (given["torque.P3"], given["shaft.Freq1"]) == (0.6, 1.6)
 
@@ -308,7 +319,9 @@ def test_a_wind_plant_stays_one_where_a_converter_of_ours_replaces_it(prepared, 
     assert {relay.record for relay in ready.relays} == {"PRC-029 for wind"}
 
 
-@pytest.mark.parametrize("records", [name for name in MADE if "elsewhere" not in name])
+@pytest.mark.parametrize(
+    "records", [name for name in MADE if "REGC" in name and "else" not in name]
+)
 @pytest.mark.slow
 def test_the_system_with_such_a_plant_has_modes_and_a_run(records, prepared, tmp_path, gfor):
     prepared(with_records(*MADE[records]), "")
@@ -334,6 +347,8 @@ def test_the_system_with_such_a_plant_has_modes_and_a_run(records, prepared, tmp
             (OF_REGCA1, line("REECC1", BATTERY), WIND[3]),
             r"has records of a wind turbine's torque and no WTDTA1, its shaft.*leave_out = \['WTTQA1'\]|WTTQA1",
         ),
+        ((*TYPE_3[:2], TYPE_3[3]), r"has records WT3E1, WT3G1, WT3P1: WT3G1, WT3E1 and WT3T1 go"),
+        ((*TYPE_3, PLANT.format("1")), r"has records REPCA1, WT3E1, WT3G1, WT3P1, WT3T1: WT3G1"),
         ((line("REGCC1", LOOP),), r"records of its converter and no REECA1, REECB1, REECC1 or"),
     ],
 )
