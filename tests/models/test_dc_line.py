@@ -281,6 +281,15 @@ def test_an_inverter_gives_at_most_the_voltage_of_its_least_angle(holds):
     assert found["beyond"] == (1e4 if holds else 0)
 
 
+@pytest.mark.parametrize(("own", "rate"), [({"CRAMP": 0.0}, 250.0), ({"CRAMP": 4.0}, 4.0)])
+def test_a_current_comes_back_by_its_ramp_or_within_the_time_of_a_switch(own, rate):
+    """From the half of its order: 0.5 / 2 ms without a ramp."""
+    one = rectifier(**own)
+    (ramp,) = (name for name in one.states if name.endswith("of_current"))
+    half = one.vector(one.states | {ramp: 0.5})
+    assert one.rates(at_rectifier(), half)[ramp] == pytest.approx(rate)
+
+
 def test_limits_let_the_operating_point_pass():
     """Less than the start's angle, and a limit of the current below the start's, do not move it."""
     one = rectifier(ALFDY=40.0, C3=900.0, C2=800.0, C1=700.0)

@@ -14,6 +14,7 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -566,3 +567,14 @@ def test_a_remote_component_gives_the_outputs_that_are_asked_for(monkeypatch):
     references, values = (ctypes.c_uint * 3)(7, 0, 4), (ctypes.c_double * 3)()
     assert component._get_real(0, ctypes.addressof(references), 3, ctypes.addressof(values)) == 0
     assert list(values) == [70.0, 0.0, 40.0]
+
+
+def test_values_of_a_component_that_was_handed_over_are_its_federates():
+    """The FMU in this process stands where the run began."""
+    component = object.__new__(FederatedComponent)
+    component.name, component.inner = "load", SimpleNamespace(values=lambda names: {"K": 0.5})
+    component._exchanges = SimpleNamespace(command=lambda *asked: {"K": 2.0, "asked": asked})
+    component._remote = False
+    assert component.values(["K"]) == {"K": 0.5}
+    component._remote = True
+    assert component.values(["K"]) == {"K": 2.0, "asked": ("load", "values", ["K"])}

@@ -156,6 +156,12 @@ def test_loads_of_both_signs_at_a_bus_are_two_elements(powsybl):
     assert drawing.p_mw == before[drawing.name].p_mw
 
 
+def test_a_rating_below_1_mva_is_one_and_none_is_unknown(powsybl):
+    network = powsybl.network.create_ieee14()
+    network.update_generators(id=["B1-G", "B2-G"], rated_s=[0.4, math.nan])
+    assert [*convert("m", network).ratings.values()] == [0.4]
+
+
 def test_names_that_steer_a_terminal_forge_no_line(ieee14, tmp_path):
     """Names of every element with an end of a line and an escape: nothing of them reaches what is printed raw."""
     hostile = "&#10;error: forged &#27;[31m"
