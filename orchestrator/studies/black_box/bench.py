@@ -20,7 +20,7 @@ from orchestrator.core.interrupts import calls
 from orchestrator.devices.fmi.component import Component, RealBatch
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.instance import open_component
-from orchestrator.devices.fmi.many_steps import StepRows
+from orchestrator.devices.fmi.many_steps import StepRows, Steps
 from orchestrator.linear.models.sampled import steps_of_times, times_of
 
 _SOURCE = Path(__file__).with_name("drive.c")
@@ -217,6 +217,36 @@ def drive(
     return outputs
 
 
+class Stretches:
+    """Stretches of a few steps of one component, one after the other, in rows that are laid out once.
+
+    ``names``: of the inputs and of the outputs; ``longest``: steps in a stretch at most; ``index``: steps that were
+    made before."""
+
+    def __init__(
+        self,
+        component: Component,
+        names: tuple[Sequence[str], Sequence[str]],
+        longest: int,
+        step_size: float,
+        index: int,
+    ) -> None:
+        self._component = component
+        self._inputs, self._late = (np.empty((longest, len(names[0]))) for _ in range(2))
+        self._outputs = np.empty((longest, len(names[1])))
+        self._rows = StepRows(component, names, self._inputs, self._outputs, self._late)
+        self._steps = self._rows.at(index, step_size)
+
+    def drive(self, inputs: Numbers, late: Numbers) -> Numbers:
+        """Outputs after each step, as `drive` has them; valid until the next stretch."""
+        count = self._steps.count = len(inputs)
+        self._inputs[:count], self._late[:count] = inputs, late
+        outputs = self._outputs[:count]
+        _make(self._component, self._steps, outputs)
+        self._steps.index += count
+        return outputs
+
+
 def _drive_stretch(
     component: Component,
     names: tuple[Sequence[str], Sequence[str]],
@@ -226,7 +256,11 @@ def _drive_stretch(
 ) -> None:
     inputs, late, outputs = rows
     asked = StepRows(component, names, inputs, outputs, late)
-    steps = asked.at(index, step_size)
+    _make(component, asked.at(index, step_size), outputs)
+
+
+def _make(component: Component, steps: Steps, outputs: Numbers) -> None:
+    """Make steps of a component, which fills ``outputs``."""
     failed = (ctypes.c_int64 * 2)()
     at = ctypes.addressof(steps), ctypes.addressof(failed)
     with calls:
@@ -237,7 +271,8 @@ def _drive_stretch(
             functions = [ctypes.cast(one, ctypes.c_void_p) for one in each]
             status = _library().drive(component.pointer, *functions, *at)
     if status:
-        component.check(status, _CALLS[failed[1]], (index + failed[0]) * step_size)
+        time = (steps.index + failed[0]) * steps.step_size
+        component.check(status, _CALLS[failed[1]], time)
     if not np.isfinite(outputs).all():
         raise AnalysisError(
             f"{component.description.path.name}: its current is no longer a finite number"

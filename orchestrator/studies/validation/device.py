@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +17,9 @@ from orchestrator.devices.fmi.component import Component, RealBatch
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.device_or_controller import NO_BUS, PORT, is_controller_alone
 from orchestrator.devices.fmi.instance import is_ours
-from orchestrator.studies.black_box.bench import drive
+from orchestrator.studies.black_box.bench import Stretches, drive
 from orchestrator.studies.validation.averaging import averaged
-from orchestrator.studies.validation.held_in_step import hold_in_step
+from orchestrator.studies.validation.held_in_step import hold_in_step, steps_held
 from orchestrator.studies.validation.instances import InstanceRun, InstanceShelf
 from orchestrator.studies.validation.over_limit import OverLimit, limit_outputs, over_limit
 from orchestrator.studies.validation.record import Recording
@@ -260,12 +261,11 @@ class PlayedDevice:
     ) -> tuple[Complex, Numbers]:
         """Currents while the voltage turns with them, and the turn as power [pu of the rating]."""
         scale = SYSTEM_BASE_MVA / self.rating
-        made = index
+        each = steps_held(self.step_size)
+        stretches = Stretches(component, self._names, each, self.step_size, index)
 
         def stretch(voltage: Complex, late: Complex) -> Complex:
-            nonlocal made
-            found = self._outputs(component, voltage, late, made)
-            made += len(voltage)
+            found = stretches.drive(_columns(voltage), _columns(late))
             return np.asarray(found[:, :2] @ _IN_PHASOR * scale)
 
         good = recording.good
@@ -280,8 +280,12 @@ class PlayedDevice:
     ) -> Numbers:
         """The current after steps with so many voltages, in the device's unit, and its part of a limit it lacks."""
         read = None if late is None else _columns(late)
-        names = _VOLTAGE, (*_CURRENT, *limit_outputs(self.description))
-        return drive(component, names, _columns(voltage), self.step_size, index, late=read)
+        return drive(component, self._names, _columns(voltage), self.step_size, index, late=read)
+
+    @cached_property
+    def _names(self) -> tuple[Sequence[str], Sequence[str]]:
+        """Names of the inputs and of the outputs of a run."""
+        return _VOLTAGE, (*_CURRENT, *limit_outputs(self.description))
 
     def _step_voltages(self, recording: Recording, steps: int) -> Complex:
         """The voltages that short steps in each step would hold, shape (steps, short steps in one)."""
@@ -291,4 +295,4 @@ class PlayedDevice:
 
 
 def _columns(values: Complex) -> Numbers:
-    return np.column_stack([values.real, values.imag])
+    return np.ascontiguousarray(values).view(float).reshape(-1, 2)

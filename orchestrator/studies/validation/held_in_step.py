@@ -43,6 +43,11 @@ class StepRun:
     turn: Numbers
 
 
+def steps_held(step_size: float) -> int:
+    """Steps of a device for which the speed of the turn is held."""
+    return max(1, round(_INTERVAL / step_size))
+
+
 def hold_in_step(
     drive: Drive, voltage: tuple[Complex, Complex], measured: Complex, step_size: float
 ) -> StepRun:
@@ -51,19 +56,19 @@ def hold_in_step(
     ``voltage``: for each step that which is held in it, and that at which the current is read; ``measured``: the
     current at the ends of the steps [pu of the rating], as ``drive`` gives it."""
     held, late = voltage
-    each = max(1, round(_INTERVAL / step_size))
+    each = steps_held(step_size)
+    along = step_size * np.arange(1, each + 1)
     parts, turns = [], []
     turn = slow = rate = 0.0
     for first in range(0, len(held), each):
         part = slice(first, first + each)
-        along = step_size * np.arange(1, len(held[part]) + 1)
-        angle = turn + rate * along  # a jump of it would ring
-        current = drive(held[part] * np.exp(1j * angle), late[part] * np.exp(1j * angle))
-        current = current * np.exp(-1j * angle)
+        angle = turn + rate * along[: len(held) - first]  # a jump of it would ring
+        ahead = np.exp(1j * angle)
+        current = drive(held[part] * ahead, late[part] * ahead) * ahead.conj()
         parts.append(current)
         turns.append((angle - slow) / _REACTANCE)
-        time, turn = float(along[-1]), float(angle[-1])
-        slow += (turn - slow) * time / _LASTS
-        ahead = current.mean() * np.conj(measured[part].mean())
-        rate = _GAIN * float(ahead.imag)
+        count, turn = len(angle), float(angle[-1])
+        slow += (turn - slow) * float(along[count - 1]) / _LASTS
+        off = current.sum() / count * np.conj(measured[part].sum() / count)
+        rate = _GAIN * float(off.imag)
     return StepRun(np.concatenate(parts), np.concatenate(turns))
