@@ -351,17 +351,17 @@ class Case(CaseDefinition):
 
         Scenarios are assembled one after the other until every name is found. A scenario that cannot be assembled
         leaves the rest undecided."""
-        named, problems = mentions.Named(), list[Problem]()
+        named, missing = mentions.Named(), list[mentions.Unmatched]()
         for name in self.scenarios:
             preparer = self._preparer(name, None, ())
             preparer.assemble()
             if preparer.problems:
                 return []
             named.add(preparer.draft)
-            problems = mentions.unmatched(self.table, named, self.place)
-            if not problems:
+            missing = mentions.unmatched(self.table, named, self.place)
+            if not missing:
                 break
-        return problems
+        return [one.problem for one in missing]
 
     def components_of(
         self,

@@ -3,13 +3,15 @@
 Components may be absent from some scenarios. A name is therefore wrong only if no scenario has a match for it."""
 
 import fnmatch
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 
 from orchestrator.cases.draft import Draft, Locate
 from orchestrator.cases.form.names import close_names, variables_of
 from orchestrator.cases.form.schema import CaseTable
 from orchestrator.core.errors import InputError, Problem
+
+_LISTS_OUTPUTS = "`gfor fmu info` lists the outputs of an FMU"
 
 
 @dataclass
@@ -36,7 +38,28 @@ class Named:
         self.homes |= set(draft.network.buses) if draft.network else set()
 
 
-def unmatched(case: CaseTable, named: Named, place: Locate) -> list[Problem]:
+@dataclass(frozen=True)
+class Unmatched:
+    """A name that matches nothing so far, at its place.
+
+    ``known``: names among which close ones are; ``otherwise``: the hint where none is close. To look for close ones
+    takes longer than to look whether a name is there, and the next scenario may have it."""
+
+    where: str
+    text: str
+    name: str = ""
+    known: Collection[str] = ()
+    otherwise: str = ""
+
+    @property
+    def problem(self) -> Problem:
+        if not self.name:
+            return Problem(self.where, self.text)
+        hint = close_names(self.name, sorted(self.known), self.otherwise)
+        return Problem(self.where, f"{self.text}; {hint}")
+
+
+def unmatched(case: CaseTable, named: Named, place: Locate) -> list[Unmatched]:
     return [
         *_states(case, named, place),
         *_areas(case, named, place),
@@ -45,7 +68,7 @@ def unmatched(case: CaseTable, named: Named, place: Locate) -> list[Problem]:
     ]
 
 
-def _states(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
+def _states(case: CaseTable, named: Named, place: Locate) -> Iterator[Unmatched]:
     analysis = case.analysis
     groups: list[tuple[str, list[str]]] = []
     for k, mode in enumerate(analysis.modes):
@@ -56,12 +79,12 @@ def _states(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
     for where, patterns in groups:
         for pattern in patterns:
             if not fnmatch.filter(named.states, pattern) and not _of_foreign(named, pattern):
-                hint = close_names(
-                    pattern, sorted(named.states), "`gfor modes --json` lists the states"
-                )
-                yield Problem(
+                yield Unmatched(
                     where,
-                    f"{pattern!r}: no scenario has a state component.state of that name; {hint}",
+                    f"{pattern!r}: no scenario has a state component.state of that name",
+                    pattern,
+                    named.states,
+                    "`gfor modes --json` lists the states",
                 )
 
 
@@ -69,32 +92,32 @@ def _of_foreign(named: Named, pattern: str) -> bool:
     return "." in pattern and bool(fnmatch.filter(named.foreign, pattern.partition(".")[0]))
 
 
-def _areas(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
+def _areas(case: CaseTable, named: Named, place: Locate) -> Iterator[Unmatched]:
     for area, patterns in case.analysis.areas.items():
         for pattern in patterns:
             if not fnmatch.filter(named.homes, pattern):
-                hint = close_names(
-                    pattern, sorted(named.homes), "name components, or the buses that feed them"
-                )
-                yield Problem(
+                yield Unmatched(
                     place("analysis", "areas", area),
-                    f"{pattern!r}: no scenario has such a component or bus; {hint}",
+                    f"{pattern!r}: no scenario has such a component or bus",
+                    pattern,
+                    named.homes,
+                    "name components, or the buses that feed them",
                 )
 
 
-def _records(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
+def _records(case: CaseTable, named: Named, place: Locate) -> Iterator[Unmatched]:
     for pattern in case.solver.record:
         if (
             pattern != "*"
             and not fnmatch.filter(named.outputs, pattern)
             and not _of_foreign(named, pattern)
         ):
-            hint = close_names(
-                pattern, sorted(named.outputs), "`gfor fmu info` lists the outputs of an FMU"
-            )
-            yield Problem(
+            yield Unmatched(
                 place("solver", "record"),
-                f"{pattern!r}: no scenario has such an output to record; {hint}",
+                f"{pattern!r}: no scenario has such an output to record",
+                pattern,
+                named.outputs,
+                _LISTS_OUTPUTS,
             )
 
 
@@ -113,22 +136,22 @@ def shown_signals(case: CaseTable, place: Locate) -> list[tuple[str, str]]:
     ]
 
 
-def _signals(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
+def _signals(case: CaseTable, named: Named, place: Locate) -> Iterator[Unmatched]:
     for where, expression in shown_signals(case, place):
         yield from _signal(where, expression, named)
 
 
-def _signal(where: str, expression: str, named: Named) -> Iterator[Problem]:
+def _signal(where: str, expression: str, named: Named) -> Iterator[Unmatched]:
     try:
         names = variables_of(expression)
     except InputError as error:
-        yield Problem(where, str(error))
+        yield Unmatched(where, str(error))
         return
     for name in names:
         component = name.partition(".")[0]
         if name not in named.outputs and component not in named.foreign:
-            own = sorted(output for output in named.outputs if output.startswith(f"{component}."))
-            hint = close_names(
-                name, own or sorted(named.outputs), "`gfor fmu info` lists the outputs of an FMU"
+            own = [output for output in named.outputs if output.startswith(f"{component}.")]
+            known = own or named.outputs
+            yield Unmatched(
+                where, f"no scenario has an output {name!r}", name, known, _LISTS_OUTPUTS
             )
-            yield Problem(where, f"no scenario has an output {name!r}; {hint}")
