@@ -49,7 +49,7 @@ OLD = {
 # a command in a group has the module of its old name
 _MODULES = {new: old for old, new in OLD.items()}
 
-_READERS = ("signal compare", "signal identify", "signal source", "validate", "verify")
+_READERS = ("report", "signal compare", "signal identify", "signal source", "validate", "verify")
 """Commands that read recordings, with xarray, and hand no array of theirs to dask or pint."""
 
 # the page that ``gfor`` alone prints

@@ -23,7 +23,7 @@ from orchestrator.core.errors import (
     RunInterruptedError,
 )
 from orchestrator.core.interrupts import calls
-from orchestrator.core.late import xr
+from orchestrator.core.late import import_xarray_alone, xr
 from orchestrator.core.safe_files import PARTIAL, made_folder
 from orchestrator.face.api.scenario import RunEndedWarning, Scenario
 from orchestrator.face.cli import checkpoints, federates, run_request, terminal
@@ -122,6 +122,8 @@ def _run_all(
     workers = _number_of_workers(scenarios, options, engine)
     if options.threads is None and workers > 1 and workers >= number_of_cores():
         options.threads = 1  # each core has its scenario
+    with calls:  # all copies of this process have it, and none imports dask
+        import_xarray_alone()
     runs = _Runs(scenarios, folder, options, engine=engine, kept=kept, workers=workers)
     for index, outcome in _outcomes(scenarios, runs.run_one, console, workers):
         runs.take(scenarios[index].name, outcome)
