@@ -4,6 +4,7 @@ bad call. The declarations of FMI's layered standard are held against the compon
 import math
 import re
 import zipfile
+from functools import cache
 from xml.etree import ElementTree
 
 import fmpy
@@ -30,20 +31,27 @@ ROOM = 17_500_000  # bytes that the component may take: 16 MiB are its stack
 LEAKS = 250  # calls that fill the rest if one of them leaves 3 kB behind
 
 
+@cache
+def compiled(path):
+    """A component as the host's machine code, of which each instance is one more."""
+    identifier = fmpy.read_model_description(str(path), validate=False).coSimulation.modelIdentifier
+    with zipfile.ZipFile(path) as archive:
+        code = archive.read(f"binaries/{PLATFORM}/{identifier}.wasm")
+    engine = wasmtime.Engine()
+    return engine, components.Component(engine, code)
+
+
 class Web:
     """One instance in wasmtime, with everything it logged."""
 
     def __init__(self, path, token=None, name="one", room=None, **more):
         self.md = fmpy.read_model_description(str(path), validate=False)
         self.vr = {v.name: v.valueReference for v in self.md.modelVariables}
-        identifier = self.md.coSimulation.modelIdentifier
-        with zipfile.ZipFile(path) as archive:
-            code = archive.read(f"binaries/{PLATFORM}/{identifier}.wasm")
-        engine = wasmtime.Engine()
+        engine, component = compiled(path)
         self.store, self.log = wasmtime.Store(engine), []
         if room is not None:
             self.store.set_limits(memory_size=room)
-        component, linker = components.Component(engine, code), components.Linker(engine)
+        linker = components.Linker(engine)
         with linker.root() as root, root.add_instance("fmi:fmi3/callbacks@3.0.0") as callbacks:
             callbacks.add_func("log-message", lambda _, *message: self.log.append(message))
         self.made = linker.instantiate(self.store, component)
@@ -81,10 +89,11 @@ class Web:
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("web")
-    return {
+    yield {
         name: export(NativeFmu(build_model(name), "3.0"), folder, ("linux64", PLATFORM))
         for name in ("gfor", "two_area_grid")
     }
+    compiled.cache_clear()  # while the host's library is there
 
 
 @pytest.fixture
