@@ -7,7 +7,6 @@ import zipfile
 import fmpy
 import numpy as np
 import pytest
-from fmpy.validation import validate_fmu
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -17,6 +16,7 @@ from fmus.toolchain.native_fmu import NativeFmu
 from orchestrator.core.errors import ComponentError
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.fmi.loaded_component import LoadedComponent
+from orchestrator.devices.fmi.validation import fmpys_problems
 from tests.support.host import DISCARD, ERROR, GENERATOR, OK, H, running
 
 MODELS = [name for name in model_names() if not needs_arguments(name)]
@@ -29,7 +29,7 @@ SOME = ["gfor", "gfor_abc", "gfor_phasor", "two_area_phasor_grid", GENERATOR, "t
 @pytest.mark.parametrize("name", MODELS)
 def test_a_native_fmu_is_valid_and_carries_no_python(name, fmu_path, extracted):
     path = fmu_path(name, True)
-    assert validate_fmu(str(path)) == []
+    assert fmpys_problems(path) == []
     md = fmpy.read_model_description(str(path), validate=True)  # against the standard's schema
     assert md.coSimulation.providesDirectionalDerivative
     assert not md.coSimulation.needsExecutionTool

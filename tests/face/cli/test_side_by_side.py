@@ -68,16 +68,15 @@ def test_all_files_are_those_of_one_after_the_other(tmp_path, own):
         text.replace("[components.gfor]\n", f"[components.gfor]\n{own}"), encoding="utf-8"
     )
     assert own in case.read_text(encoding="utf-8")
-    found = []
+    found, drawn = [], not own
     for workers in (1, 2):
         out = tmp_path / str(workers)
-        process = started(
-            tmp_path / "tmp", case, "--stop", "1.3", "--linear", "--out", out, "--workers", workers
-        )
+        words = (case, "--stop", "1.3", "--linear", "--out", out, "--workers", workers)
+        process = started(tmp_path / "tmp", *words, drawn=drawn)
         code, said, error = printed(process)
         assert code == 0, error
         assert list((tmp_path / "tmp").iterdir()) == []
-        found.append((values_of(out), untimed(said, out), error.replace(str(out), "")))
+        found.append((values_of(out, drawn=drawn), untimed(said, out), error.replace(str(out), "")))
     assert len([name for name in found[0][0] if name.endswith("trajectory.nc")]) > 1
     assert found[0] == found[1]
 

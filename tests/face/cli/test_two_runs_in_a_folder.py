@@ -5,7 +5,6 @@ import os
 import shutil
 import signal
 import subprocess
-import sys
 import time
 
 import pytest
@@ -17,6 +16,7 @@ from orchestrator.face.cli import run as command
 from orchestrator.output.results.lock import LOCK, hold_folder
 from orchestrator.systems.coupling.observers import Progress
 from tests.face.cli.test_resume import checkpoints_in
+from tests.support.undrawn import UNDRAWN
 
 fcntl = pytest.importorskip("fcntl", reason="Windows has no such lock")
 
@@ -40,7 +40,7 @@ def live(tmp_path):
         tmp_path / "out",
     )
     process = subprocess.Popen(
-        [sys.executable, "-m", "orchestrator.face.cli", "run", *map(str, words)],
+        [*UNDRAWN, "run", *map(str, words)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
