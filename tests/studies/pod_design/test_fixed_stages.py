@@ -9,6 +9,7 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.core.errors import AnalysisError, InputError
+from orchestrator.devices.fmi import instance
 from orchestrator.studies.coordinated_design.one_point import design_controller
 from orchestrator.studies.modes.modes import compute_modes
 from orchestrator.studies.pod_design import stages
@@ -23,8 +24,15 @@ RENAMED = {"pod_p.N_S": "stages", "pod_q.N_S": "stages_q"}
 
 @pytest.fixture(scope="module")
 def vendor(tmp_path_factory):
-    """Write the two-area system with the device: variables' new names, and values of its parameters."""
-    folder = tmp_path_factory.mktemp("vendor")
+    """Write the two-area system with the device: variables' new names, and values of its parameters.
+
+    It runs in this process, as our own do: questions to another one would take most of a design's time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(instance, "is_ours", lambda path: True)
+        yield writing(tmp_path_factory.mktemp("vendor"))
+
+
+def writing(folder):
     ours = load_case("two_area")
     fmu = ours.prepare(["gfor"])[0].system.components["gfor"].description.path
 
