@@ -332,9 +332,9 @@ def _corners(signal: Complex, begin: int, lag: int, interval: float) -> list[int
     begins = begin + 2 * lag + width
     ends = min(begin + round(_LONGEST_EVENT / interval) + lag, len(bends) - far)
     found = []
-    for at in range(begins + far, ends):
+    for at in begins + far + np.flatnonzero(bends[begins + far : max(ends, 0)] > least):
         near = bends[at - lag : at + lag + 1]
         beside = max(bends[at - far : at - aside].max(), bends[at + aside : at + far].max())
-        if bends[at] == near.max() and bends[at] > max(least, _STANDS_OUT * beside):
-            found.append(at - lag - width // 2)
+        if bends[at] == near.max() and bends[at] > _STANDS_OUT * beside:
+            found.append(int(at) - lag - width // 2)
     return found

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass, replace
+from functools import cache
 from math import sqrt
 
 from tests.devices.acceptance.gallery.build import Source, Variable
@@ -312,6 +313,7 @@ def carriers(name, fault="", *, only=(), thread="", rating=1500, **options):
     ]
 
 
+@cache
 def good():
     """FMUs with nothing wrong."""
     members = [
@@ -404,6 +406,7 @@ def good():
 IDENTITY = binding("rectangular", current='base = "100 MVA"')
 
 
+@cache
 def faulty():
     """FMUs with one fault each."""
 
