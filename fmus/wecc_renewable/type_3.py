@@ -12,11 +12,11 @@
     WT3P1: ω_g − ω_ref → Kpp + Kip/s, and P_ord − PMX → Kpc + Kic/s, the integral within 0…TetaMax; both together
            → 1/(1 + s·Tp) within TetaMin…TetaMax, by RTetaMax at most = θ
 
-WT3E1 and WT3P1 are per unit of turbines·Prated, the rest of S_n. At the operating point the pitch is TetaMin, and
-linear models keep it there; the integral of WT3P1's speed is Kpc·(PMX − P_ord) then, and its sum TetaMin, as in PSS/E.
+The active part of WT3E1 and WT3P1 are per unit of turbines·Prated, the rest of S_n. At the operating point the pitch is
+TetaMin, and linear models keep it there; the integral of WT3P1's speed is Kpc·(PMX − P_ord) then, and its sum TetaMin.
 
-Sources: InterPSS' `Wt3g1Model` to `Wt3p1Model`, which were held against PSS/E; OpenIPSL at 2be0558a and STEPS at
-e5579d20 (WT3G1, WT3E1)."""
+Sources: InterPSS' `Wt3g1Model` to `Wt3p1Model`, and its traces of PSS/E, which show the bases; OpenIPSL at 2be0558a and
+STEPS at e5579d20 (WT3G1, WT3E1)."""
 
 from math import pi
 
@@ -63,14 +63,14 @@ CONTROL = (
     seconds("Tfv", 0.15, "Filter of the voltage's regulator; 0 leaves it out"),
     number("KPV", 18.0, "Proportional gain of the voltage", 0),
     number("KIV", 5.0, "Integral gain of the voltage", 0, "1/s"),
-    pu("Xc", 0.0, "Reactance behind which the voltage is controlled", base="rating"),
+    power("Xc", 0.0, "Reactance behind which the voltage is controlled"),
     seconds("TFP", 0.05, "Lag of the power's order", 1e-3),
     number("Kpp", 3.0, "Proportional gain of the torque", 0),
     number("KIP", 0.6, "Integral gain of the torque", 0, "1/s"),
     pu("PMX", 1.12, "Most power", base="rating"),
     pu("PMN", 0.04, "Least power", base="rating"),
-    pu("QMX", 0.436, "Most reactive power", base="rating"),
-    pu("QMN", -0.436, "Least reactive power", base="rating"),
+    power("QMX", 0.436, "Most reactive power"),
+    power("QMN", -0.436, "Least reactive power"),
     pu("IPMAX", 1.1, "Most active current", 1e-3, base="rating"),
     seconds("TRV", 0.02, "Filter of the voltage; 0 leaves it out"),
     number("RPMX", 0.45, "Largest rate of the power's order", 0, "pu/s"),
@@ -199,7 +199,7 @@ class Wt3:
             with m.scope("pitch"):
                 self._pitch = declared(m, PITCH, TYPICAL)
         self._P_0 = t.P_0 * self._per
-        self._Q_0 = t.Q_0 * self._per
+        self._Q_0 = Expr(t.Q_0)  # per unit of S_n
         m.require(0.2 - p.PMN, "electrical.PMN, at which the speed is wPmin, lies below 0.2 pu")
         self.speed_0 = self._speed_of(self._P_0)
         with m.scope("shaft"):
@@ -240,31 +240,31 @@ class Wt3:
     def _reactive(self, m: ModelBuilder) -> Expr:
         """The command of the emf [pu]."""
         p, t = self._p, self._t
-        P, Q = t.P * self._per, t.Q * self._per
+        P, Q = t.P, t.Q
         by_voltage, by_angle = p.VARFLG > 0, p.VARFLG < 0
         size = sqrt(P**2 + Q**2 + 1e-12) / fmax(t.size, LEAST_VOLTAGE)
-        size_0 = sqrt(self._P_0**2 + self._Q_0**2 + 1e-12) / t.size_0
+        size_0 = sqrt(t.P_0**2 + t.Q_0**2 + 1e-12) / t.size_0
         seen_0 = t.size_0 - p.Xc * size_0
         change = m.parameter(
             "delta_ref",
             0.0,
             "pu",
             "Change of the voltage's reference, or of the reactive power's where VARFLG is not 1",
-            base="rating",
+            base="S_n",
             tunable=True,
         )
         seen = low_pass_or_nothing(m, "voltage", t.size - p.Xc * size, p.TRV, seen_0)
         error = if_else(by_voltage, seen_0 + change - seen, 0)
         straight = low_pass_or_nothing(m, "straight", p.KPV * error, p.Tv, 0.0)
-        slow = m.state("integral", self._Q_0, "pu", "Integral of the voltage", base="rating")
+        slow = m.state("integral", self._Q_0, "pu", "Integral of the voltage", base="S_n")
         free = slow + straight
         outward = logic_or(logic_and(free > p.QMX, error > 0), logic_and(free < p.QMN, error < 0))
         resting = (self._Q_0 - slow) / BYPASS_TIME
         acts = logic_and(by_voltage, p.KIV > 0)
         m.derivative(slow, if_else(acts, if_else(outward, 0, p.KIV * error), resting))
         of_voltage = low_pass_or_nothing(m, "order", clamp(free, p.QMN, p.QMX), p.Tfv, self._Q_0)
-        measured = low_pass_or_nothing(m, "power", P, p.Tp, self._P_0)
-        of_angle = measured * self._Q_0 / if_else(by_angle, self._P_0, 1)
+        measured = low_pass_or_nothing(m, "power", P, p.Tp, t.P_0)
+        of_angle = measured * self._Q_0 / if_else(by_angle, t.P_0, 1)
         asked = if_else(by_voltage, of_voltage, if_else(by_angle, of_angle, self._Q_0) + change)
         _within(m, self._Q_0, p, "QMN", "QMX")
         _within(m, t.size_0, p, "VMINCL", "VMAXCL")
