@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import brentq
@@ -46,7 +47,12 @@ def reactive(p, v, current, kilovolts):
 
 def curve(points, x):
     """Straight lines through points, level beyond them."""
-    return float(np.interp(x, *zip(*points, strict=True)))
+    if x <= points[0][0]:
+        return points[0][1]
+    for (a, low), (b, high) in pairwise(points):
+        if x < b:
+            return low + (high - low) / (b - a) * (x - a)
+    return points[-1][1]
 
 
 def meeting(p, most, far, order, ordered):
