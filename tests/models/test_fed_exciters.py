@@ -278,11 +278,11 @@ def test_the_field_voltage_stops_at_its_limit_and_leaves_it_at_once(case, side):
     alone = exciter(name, values)
     assert not refused(alone)
     limit = upper if side > 0 else lower
-    found, x = integrated(alone, lambda t: [V_T, E_FD, 0.3 * side], 6.0)
+    found, x = integrated(alone, lambda t: [V_T, E_FD, 0.3 * side], 6.0, step=2e-3)
     voltages = [y["E_fd"] for y in found]
     assert voltages[-1] == pytest.approx(limit, rel=1e-4, abs=2e-3)
     assert side * max(side * np.array(voltages)) == pytest.approx(limit, rel=1e-3, abs=2e-3)
-    back, _ = integrated(alone, lambda t: [V_T, E_FD, -0.3 * side], 1.0, x=x)
+    back, _ = integrated(alone, lambda t: [V_T, E_FD, -0.3 * side], 1.0, step=2e-3, x=x)
     assert side * (limit - back[-1]["E_fd"]) > 0.2
 
 
