@@ -373,7 +373,7 @@ def test_the_archive_needs_nothing_but_python(name, fmu_path):
     ids=[*NAMES, *(f"{name}-left_out" for name in LEFT_OUT)],
 )
 def test_compiled_and_python_kernel_agree(name, parameters, fmu_path, monkeypatch):
-    """200 steps of held random inputs, large enough to meet limits."""
+    """100 steps of held random inputs, large enough to meet limits."""
     path, model = fmu_path(name), build_model(name)
     inputs, outputs = [i.name for i in model.inputs], [o.name for o in model.outputs]
     internal = [s.name for s in model.states] + [f"der({s.name})" for s in model.states]
@@ -384,7 +384,7 @@ def test_compiled_and_python_kernel_agree(name, parameters, fmu_path, monkeypatc
         with initialised(path, parameters) as component:
             u, y = RealBatch(component, inputs), RealBatch(component, outputs + internal)
             start, rows = u.read().copy(), [y.read().copy()]
-            for k in range(200):
+            for k in range(100):
                 u.values[:] = start + 0.1 * random.standard_normal(len(inputs))
                 u.write()
                 component.step(k * STEP, STEP)
