@@ -21,6 +21,7 @@ LOAD, LOADED_AT = (
     2.5 + 0.3j,
     0.99341,
 )  # of bus 103 [pu], and its voltage in the power flow of the RAW file
+SHORT = 3.0  # end of a recording that is enough where no value is found [s]
 INFINITE, TRIP = 1.05, 1.0  # voltage of bus 101 [pu]; the line 101-102 is out from then on [s]
 
 CASE = """
@@ -137,14 +138,15 @@ def test_an_inertia_is_found_from_six_times_its_value(case, recording):
 
 def test_a_fit_that_finds_nothing_better_is_told_and_shows_no_interval(case, recording):
     """The inertia is wrong, and an exciter's time constant is fitted in its place."""
-    row = fitted(case, recording, 40.0, fit="exciter.T_B")
+    row = fitted(case, recording[:SHORT], 40.0, fit="exciter.T_B")
     assert row["why_not"] == "no better than the start"
     assert row["value"] == row["start"] == 5.0
     assert (row["low"], row["high"], row["identifiable"]) == (None, None, False)
 
 
 def test_a_fit_that_stands_on_a_bound_is_told_and_shows_no_interval(case, recording):
-    row = fitted(case, recording, 20.0, fit="machine.H", bounds={"machine.H": (7.0, 30.0)})
+    given = {"fit": "machine.H", "bounds": {"machine.H": (7.0, 30.0)}}
+    row = fitted(case, recording[:SHORT], 20.0, **given)
     assert row["why_not"] == "at its bound"
     assert row["value"] == pytest.approx(7.0, abs=1e-3)
     assert (row["low"], row["high"]) == (None, None)
