@@ -21,7 +21,7 @@ from fmus.static_var.held_bus import (
     named_by_bus,
 )
 from fmus.static_var.susceptance import MOST_POWER
-from fmus.toolchain.blocks import clamp, held_at_limits, lead_lag
+from fmus.toolchain.blocks import clamp, held_at_limits, lead_lag, reached
 from fmus.toolchain.frames import Phasor, power
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
@@ -123,11 +123,11 @@ def _emf(m: ModelBuilder, port: DevicePort, size: Expr, held: HeldVoltage, X: Ex
         "Vref", held.start + droop * I_0, "pu", "Voltage reference", base="bus"
     )
     E = m.state("emf", E_0, "pu", "integrator with limits, the emf", base="bus")
-    error = reference - held.now - droop * (E - size) / X
-    first = lead_lag(m, "first", error, leads[0], lags[0])
-    second = lead_lag(m, "second", first, leads[1], lags[1])
     share = if_else(size < cutoff, size / fmax(cutoff, LEAST_VOLTAGE), 1)
     high = fmin(size + X * I_C * share, E_LIMIT)
     low = fmin(size - X * I_L * share, high)
+    error = reference - held.now - droop * (reached(E, low, high) - size) / X
+    first = lead_lag(m, "first", error, leads[0], lags[0])
+    second = lead_lag(m, "second", first, leads[1], lags[1])
     m.derivative(E, held_at_limits(E, K * clamp(second, V_MIN, V_MAX), low, high))
     return clamp(E, low, high)

@@ -1,5 +1,6 @@
 """Declarations that exciters, governors and stabilisers share."""
 
+from fmus.toolchain.blocks import ROUNDING
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port_variables import TRANSFORMER
 from fmus.toolchain.symbols import Expr, Scalar, if_else
@@ -34,10 +35,6 @@ def time_constant(
     return T
 
 
-_ROUNDING = 1e-9
-"""How far beyond a limit an operating point may lie that a power flow puts there to its accuracy [pu]."""
-
-
 def require_between(
     m: ModelBuilder, value: Scalar, low: Scalar, high: Scalar, names: tuple[str, str], rule: str
 ) -> None:
@@ -46,6 +43,6 @@ def require_between(
     At the limit itself it starts, as in PSS/E."""
     for margin, name, side in ((value - low, names[0], "below"), (high - value, names[1], "above")):
         m.require(
-            margin + _ROUNDING,
+            margin + ROUNDING,
             f"{name}: the operating point of the power flow lies at or {side} this limit, {rule}",
         )

@@ -13,8 +13,11 @@ from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and,
 BYPASS_TIME = 0.01
 
 RETURN_TIME = 2e-3
-"""Time constant [s] with which a state returns to the limit that a step of integration carried it over: as long as the
-longest internal step of any model, so that no stage of Runge-Kutta's method lands below the limit again."""
+"""Time constant [s] with which a state returns to the limit that it lies beyond: as long as the longest internal step
+of any model, so that no stage of Runge-Kutta's method lands below the limit again."""
+
+ROUNDING = 1e-9
+"""How far beyond a limit [pu] lies what a power flow puts at the limit to its accuracy."""
 
 
 def washout(m: ModelBuilder, name: str, u: Expr, T_W: Scalar, initial: Scalar = 0.0) -> Expr:
@@ -151,8 +154,9 @@ def close_limited_low_pass(
 ) -> Expr:
     """`limited_low_pass` with a state that is declared already, for what the input is fed back from."""
     left_out = _is_zero(T)
-    rate = (u - x) / if_else(left_out, BYPASS_TIME, T)
-    m.derivative(x, if_else(left_out, rate, held_at_limits(x, rate, low, high)))
+    lag = if_else(left_out, BYPASS_TIME, T)
+    held = held_at_limits(x, (u - reached(x, low, high)) / lag, low, high)
+    m.derivative(x, if_else(left_out, (u - x) / lag, held))
     return clamp(if_else(left_out, u, x), low, high)
 
 
@@ -177,12 +181,35 @@ def limited_proportional_integral(
 
 
 def held_at_limits(x: Expr, rate: Scalar, low: Scalar, high: Scalar) -> Expr:
-    """The rate of a state with non-windup limits: what lies beyond a limit after a step returns to it at once.
+    """The rate of a state with non-windup limits (IEEE 421.5, annex E), which is at a limit where it lies beyond it.
 
-    ``rate``: its rate without limits; ``low``, ``high``: the limits; use the state through `clamp`."""
-    above = logic_and(x >= high, Expr(rate) > 0)
-    below = logic_and(x <= low, Expr(rate) < 0)
-    return if_else(above, (high - x) / RETURN_TIME, if_else(below, (low - x) / RETURN_TIME, rate))
+    A step of integration may carry the state over a limit, and a limit may move past it. It then returns with
+    `RETURN_TIME`, whichever way its rate leads; a rate that leads inward acts beside that.
+
+    ``rate``: its rate without limits, of `reached` in place of the state; ``low``, ``high``: the limits; use the state
+    through `clamp`."""
+    rate = Expr(rate)
+    is_above, is_below = _beyond(x, low, high)
+    rises, falls = rate > 0, rate < 0
+    at_high = logic_or(is_above, logic_and(x >= high, rises))
+    at_low = logic_or(is_below, logic_and(x <= low, falls))
+    from_high = (high - x) / RETURN_TIME + if_else(falls, rate, 0)
+    from_low = (low - x) / RETURN_TIME + if_else(rises, rate, 0)
+    return if_else(at_high, from_high, if_else(at_low, from_low, rate))
+
+
+def reached(x: Expr, low: Scalar, high: Scalar) -> Expr:
+    """The value that a state with non-windup limits has in its own rate: the limit that it lies beyond, or itself.
+
+    At a limit it moves as the state does, where `clamp` moves half as far: a lag that rests at its limit keeps its time
+    constant in a linear model."""
+    is_above, is_below = _beyond(x, low, high)
+    return if_else(is_above, high, if_else(is_below, low, x))
+
+
+def _beyond(x: Expr, low: Scalar, high: Scalar) -> tuple[Expr, Expr]:
+    """Whether a state lies above and below its limits by more than rounding."""
+    return x > high + ROUNDING, x < low - ROUNDING
 
 
 def _is_zero(T: Scalar) -> Expr:

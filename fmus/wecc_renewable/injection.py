@@ -10,7 +10,7 @@ Sources: WECC, "Solar Plant Dynamic Modeling Guidelines" (2014) and its specific
 from dataclasses import dataclass
 
 from fmus.synchronous_generator.data_lines import declared, number, power, pu, seconds
-from fmus.toolchain.blocks import clamp, held_at_limits, low_pass_or_nothing
+from fmus.toolchain.blocks import clamp, held_at_limits, low_pass_or_nothing, reached
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and
 from fmus.wecc_renewable.signals import ROUNDING, SOURCE, through_points
@@ -61,8 +61,9 @@ class _Lag:
     high: Scalar = UNLIMITED
 
     def follow(self, m: ModelBuilder, u: Expr) -> None:
-        rate = clamp((u - self.x) / self.T, *self.rates)
-        m.derivative(self.x, held_at_limits(self.x, rate, -UNLIMITED, self.high))
+        limits = -UNLIMITED, self.high
+        rate = clamp((u - reached(self.x, *limits)) / self.T, *self.rates)
+        m.derivative(self.x, held_at_limits(self.x, rate, *limits))
 
 
 def declare_injection(m: ModelBuilder, v: Expr, v_0: Expr, P_0: Scalar, Q_0: Scalar) -> Injection:

@@ -2,9 +2,13 @@
 
 Without saturation and rectifier's loading, and with K_E = 1, E_fd is what drives the exciter."""
 
+import numpy as np
 import pytest
 
+from fmus.toolchain.blocks import RETURN_TIME, limited_low_pass
+from fmus.toolchain.model_builder import ModelBuilder
 from tests.models.parts import E_FD, V_T, exciter, integrated, refused
+from tests.support.evaluated import Evaluated
 
 LINEAR = {"S_E1": 0.0, "S_E2": 0.0, "K_E": 1.0, "T_E": 0.1}
 ALTERNATOR = LINEAR | {"K_C": 0.0, "K_D": 0.0}
@@ -93,3 +97,44 @@ def test_an_integrator_does_not_wind_up_at_its_limit(name, values):
     found, x = integrated(alone, lambda t: [V_T, E_FD, 0.5], SETTLED)
     back, _ = integrated(alone, lambda t: [V_T, E_FD, -0.2], 0.1, x=x)
     assert back[-1]["E_fd"] < 0.95 * found[-1]["E_fd"]
+
+
+LAG = 0.5  # [s]
+
+
+def limited_lag(at_start):
+    """A lag whose input and limits are inputs."""
+    m = ModelBuilder("alone", "A lag within limits")
+    u, low, high = (m.input(name, "pu", name, base="S_n") for name in ("u", "low", "high"))
+    y = limited_low_pass(m, "x", u, LAG, low, high, initial=at_start)
+    m.output("y", y, "pu", "y", base="S_n")
+    return Evaluated(m.build())
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("u", [0.2, 0.55, 0.9], ids=["inward", "slowly inward", "outward"])
+def test_a_lag_starts_from_the_limit_that_has_moved_past_it(u, side):
+    """From 1, a limit moves to 0.6: a lag starts there, as IEEE 421.5 has it, and not from where it was.
+
+    Its return to the limit takes r·t·log(1 + 0.4/(r·t)) from what it has moved by its own rate r meanwhile, t being
+    `RETURN_TIME`; when the limit opens again the lag goes on from there."""
+    own = limited_lag(side * 1.0)
+    limits = (-9.0, side * 0.6) if side > 0 else (side * 0.6, 9.0)
+    found, x = integrated(own, lambda t: [side * u, *limits], 0.3)
+    t = np.arange(1, len(found) + 1) * 1e-3
+    wanted = side * np.minimum(u + (0.6 - u) * np.exp(-t / LAG), 0.6)
+    moved = max((0.6 - u) / LAG, 1e-9) * RETURN_TIME
+    most = moved * np.log1p(0.4 / moved)
+    off = side * (np.array([each["y"] for each in found]) - wanted)
+    assert off.min() > -1e-9
+    assert off.max() < most + 1e-9
+    opened, _ = integrated(own, lambda t: [side * u, -9.0, 9.0], 0.2, x=x)
+    ideal = side * u + (wanted[-1] - side * u) * np.exp(-0.2 / LAG)
+    assert opened[-1]["y"] == pytest.approx(ideal, abs=most + 1e-9)
+
+
+def test_a_lag_at_rest_at_its_limit_is_linearised_as_within_it():
+    """A power flow puts it there to its accuracy."""
+    for start in (0.6, 0.6 - 1e-10, 0.6 + 1e-10):
+        own = limited_lag(start)
+        assert own.blocks([start, -9.0, 0.6])[0] == -1 / LAG

@@ -166,14 +166,9 @@ SLOPE = 4.0 * 0.3 / (4.0 - ZERO) ** 2
 """Saturation through CURVE's points: S_E(E)·E = SLOPE·(E − ZERO)²."""
 
 
-@pytest.mark.parametrize(
-    ("changed", "part"),
-    [({}, 0.013), ({"F_1IMF": 0.0, "K_H": 0.8}, 0.01)],
-    ids=["supply", "steady"],
-)
-def test_it_follows_its_diagram_step_by_step(changed, part):
-    """A limit that follows the supply passes a state in the dip: ideally it ends there at once, in `held_at_limits` by
-    its own lag. So the two are 1.24 % apart at any step; by a diagram with the same lag, 0.27 %."""
+@pytest.mark.parametrize("changed", [{}, {"F_1IMF": 0.0, "K_H": 0.8}], ids=["supply", "steady"])
+def test_it_follows_its_diagram_step_by_step(changed):
+    """Limits that follow the supply pass states in the dip, which return within milliseconds, ideally at once: 0.6 %."""
     p = WHOLE | changed
     own, every = exciter("rexsys", p), 5
     assert not refused(own)
@@ -187,7 +182,7 @@ def test_it_follows_its_diagram_step_by_step(changed, part):
     found = [each["E_fd"] for each in integrated(own, inputs, END, QUICK * every)[0]]
     assert diagram.found.keys() == {"V_FMAX", "V_FMIN", "V_RMAX", "V_RMIN", "V_IMAX"}
     assert np.ptp(wanted) > 0.7
-    assert np.abs(np.array(found) - wanted).max() < part * np.ptp(wanted)
+    assert np.abs(np.array(found) - wanted).max() < 0.01 * np.ptp(wanted)
 
 
 @pytest.mark.parametrize(("share", "v_t"), [(0.0, 0.7), (1.0, 0.7), (0.5, 1.2)])
