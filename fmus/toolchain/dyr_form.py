@@ -155,4 +155,13 @@ def _record(table: Mapping[str, Any]) -> DyrRecord:
 def records_beside(module: str) -> dict[str, DyrRecord]:
     """The records of ``dyr_records.toml`` beside a module's file, by PSS/E's name."""
     tables = tomllib.loads(Path(module).with_name("dyr_records.toml").read_text(encoding="utf-8"))
-    return {name: _record(table) for name, table in tables.items()}
+    return {name: _record(_whole(table, tables)) for name, table in tables.items()}
+
+
+def _whole(table: Mapping[str, Any], tables: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """A table with what it has from the record that it names in ``as``."""
+    if "as" not in table:
+        return dict(table)
+    first = _whole(tables[table["as"]], tables)
+    fields = f"{first['fields']} {table.get('fields', '')}"
+    return {**first, **table, "fields": fields}
