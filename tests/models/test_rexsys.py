@@ -168,7 +168,7 @@ SLOPE = 4.0 * 0.3 / (4.0 - ZERO) ** 2
 
 @pytest.mark.parametrize("changed", [{}, {"F_1IMF": 0.0, "K_H": 0.8}], ids=["supply", "steady"])
 def test_it_follows_its_diagram_step_by_step(changed):
-    """Limits that follow the supply pass states in the dip, which return within milliseconds, ideally at once: 0.6 %."""
+    """In the dip limits that follow the supply pass states, which return in milliseconds, ideally at once: 0.6 %."""
     p = WHOLE | changed
     own, every = exciter("rexsys", p), 5
     assert not refused(own)
