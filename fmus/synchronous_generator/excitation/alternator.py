@@ -154,15 +154,24 @@ class Alternator:
     def _constant(self, V_E: Expr) -> Expr:
         return fmax(self.p.K_E + self.curve.part(V_E) / fmax(V_E, _LEAST), _LEAST)
 
-    def require_above(self, lowest: Expr) -> None:
-        """Require that the start does not lie below V_EMIN."""
-        names = ("exciter.V_EMIN", "exciter.V_EMIN")
-        require_within(self.m, self.V_E_0, lowest, _MOST, names)
-
     def drive(self, V_R: Expr, low: Scalar = 0.0, high: Scalar = _MOST) -> None:
         """Close V_E, driven by V_R, within its limits."""
         rate = (V_R - self.V_FE) / self.p.T_E
         self.m.derivative(self.state, held_at_limits(self.state, rate, low, high))
+
+    def drive_up_to(self, V_FEMAX: Expr, V_R: Expr, V_EMIN: Expr | None = None) -> None:
+        """Close V_E, driven by V_R, from V_EMIN or 0 to where the field current is V_FEMAX; the start lies between."""
+        self.m.require(
+            V_FEMAX - self.V_FE_0,
+            "exciter.V_FEMAX must exceed the exciter's field current at the start",
+        )
+        low: Scalar = 0.0
+        if V_EMIN is not None:
+            low = V_EMIN
+            names = ("exciter.V_EMIN", "exciter.V_EMIN")
+            require_within(self.m, self.V_E_0, low, _MOST, names)
+        highest = (V_FEMAX - self.p.K_D * self.seen.I_fd) / self.constant
+        self.drive(V_R, low, fmax(highest, low))
 
 
 def alternator(m: ModelBuilder, seen: Regulated) -> Alternator:
@@ -229,16 +238,11 @@ def ac8b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         PID_0 = V_R0 / p.K_A
         require_within(m, V_R0, p.V_RMIN, p.V_RMAX, ("exciter.V_RMIN", "exciter.V_RMAX"))
         require_within(m, PID_0, p.V_PIDMIN, p.V_PIDMAX, ("exciter.V_PIDMIN", "exciter.V_PIDMAX"))
-        m.require(
-            p.V_FEMAX - V_R0, "exciter.V_FEMAX must exceed the exciter's field current at the start"
-        )
         measured = Measurement(m, seen)
         control = Controller(m, p, PID_0, (p.V_PIDMIN, p.V_PIDMAX))
         PID = control(measured.error(control.error_at_start))
         V_R = limited_low_pass(m, "amplifier", p.K_A * PID, p.T_A, p.V_RMIN, p.V_RMAX, initial=V_R0)
-        behind.require_above(p.V_EMIN)
-        highest = (p.V_FEMAX - behind.p.K_D * seen.I_fd) / behind.constant
-        behind.drive(V_R, p.V_EMIN, fmax(highest, p.V_EMIN))
+        behind.drive_up_to(p.V_FEMAX, V_R, p.V_EMIN)
         return measured.close(behind.E_fd)
 
 

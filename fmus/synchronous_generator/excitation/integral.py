@@ -178,9 +178,6 @@ def ac7b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         V_A0, first_0 = V_R0 / (p.K_P * seen.start.v_t), p.K_F1 * E_0 + p.K_F2 * V_R0
         require_within(m, V_A0, p.V_AMIN, p.V_AMAX, ("exciter.V_AMIN", "exciter.V_AMAX"))
         require_within(m, first_0, p.V_RMIN, p.V_RMAX, ("exciter.V_RMIN", "exciter.V_RMAX"))
-        m.require(
-            p.V_FEMAX - V_R0, "exciter.V_FEMAX must exceed the exciter's field current at the start"
-        )
         x = m.state("feedback", V_R0, "pu", "rate feedback, slow part of the signal", base="E_fd")
         m.derivative(x, (behind.V_FE - x) / p.T_F3)
         V_F = p.K_F3 / p.T_F3 * (behind.V_FE - x)
@@ -192,7 +189,5 @@ def ac7b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
             m, "second", rest, p.K_PA, p.K_IA, low=p.V_AMIN, high=p.V_AMAX, initial=V_A0
         )
         V_R = fmax(V_A * p.K_P * seen.terminal_voltage(behind.E_fd), -p.K_L * behind.V_FE)
-        behind.require_above(p.V_EMIN)
-        highest = (p.V_FEMAX - behind.p.K_D * seen.I_fd) / behind.constant
-        behind.drive(V_R, p.V_EMIN, fmax(highest, p.V_EMIN))
+        behind.drive_up_to(p.V_FEMAX, V_R, p.V_EMIN)
         return measured.close(behind.E_fd)

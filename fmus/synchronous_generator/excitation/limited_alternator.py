@@ -19,7 +19,7 @@ Sources: OpenIPSL at 2be0558a (ESAC2A), OPAL-RT's ephasorsim-modelica-library at
 OpenIPSL's EXAC3 at c482ff5b has K_F beyond E_FDN; its own texts, OPAL-RT's library and the standard have it below."""
 
 from fmus.synchronous_generator.data_lines import Given, declared, pu, seconds
-from fmus.synchronous_generator.excitation.alternator import Alternator, alternator
+from fmus.synchronous_generator.excitation.alternator import EXAC2, alternator
 from fmus.synchronous_generator.excitation.common import (
     BEFORE,
     BEHIND,
@@ -32,18 +32,11 @@ from fmus.synchronous_generator.excitation.common import (
 )
 from fmus.toolchain.blocks import clamp, limited_low_pass
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin
+from fmus.toolchain.symbols import Expr, fmax, fmin
 
 ESAC2A = (
-    pu("K_A", 400.0, "Gain", 1e-3),
-    seconds("T_A", 0.02, "Amplifier; 0 leaves the lag out"),
-    pu("V_AMAX", 9.0, "Upper limit of V_A"),
-    pu("V_AMIN", -5.43, "Lower limit of V_A"),
-    pu("K_B", 1.0, "Gain of the second stage", 1e-3),
-    pu("V_RMAX", 9.0, "Upper limit of V_R"),
-    pu("V_RMIN", -5.43, "Lower limit of V_R"),
+    *(line for line in EXAC2 if line.name not in ("K_L", "V_LR")),
     pu("V_FEMAX", 14.0, "Highest field current, as V_FE"),
-    pu("K_H", 0.0, "Feedback of the field current", 0),
 )
 ESAC3A = (
     pu("K_A", 45.62, "Gain", 1e-3),
@@ -80,7 +73,7 @@ def esac2a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
             m, "amplifier", p.K_A * error, p.T_A, p.V_AMIN, p.V_AMAX, initial=V_A0
         )
         driven = seen.lifted(p.K_B * (V_A - p.K_H * behind.V_FE), BEHIND, V_R0)
-        _drive(m, behind, clamp(driven, p.V_RMIN, p.V_RMAX), p.V_FEMAX)
+        behind.drive_up_to(p.V_FEMAX, clamp(driven, p.V_RMIN, p.V_RMAX))
         return measured.close(behind.E_fd)
 
 
@@ -98,8 +91,7 @@ def esac3a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         V_A = limited_low_pass(
             m, "amplifier", p.K_A * rest, p.T_A, p.V_AMIN, p.V_AMAX, initial=V_A0
         )
-        behind.require_above(p.V_EMIN)
-        _drive(m, behind, p.K_R * E_fd * V_A, p.V_FEMAX, p.V_EMIN)
+        behind.drive_up_to(p.V_FEMAX, p.K_R * E_fd * V_A, p.V_EMIN)
         return measured.close(E_fd)
 
 
@@ -135,15 +127,3 @@ def _rate_feedback_of_two_gains(m: ModelBuilder, p: Given, E_fd: Expr, E_0: Expr
     V_F = (weighed(E_fd) - x) / p.T_F
     m.derivative(x, V_F)
     return V_F
-
-
-def _drive(
-    m: ModelBuilder, behind: Alternator, V_R: Expr, V_FEMAX: Expr, low: Scalar = 0.0
-) -> None:
-    """Close V_E, driven by V_R, from its lower limit to where the field current is the highest."""
-    m.require(
-        V_FEMAX - behind.V_FE_0,
-        "exciter.V_FEMAX must exceed the exciter's field current at the start",
-    )
-    highest = (V_FEMAX - behind.p.K_D * behind.seen.I_fd) / behind.constant
-    behind.drive(V_R, low, fmax(highest, low))
