@@ -178,6 +178,32 @@ def test_a_generator_with_it_starts_in_steady_state(name, factory):
     assert device.outputs(at_rest)["q"] == pytest.approx(0.15, abs=1e-12)
 
 
+WITHOUT_FEEDBACK = {
+    # name: (gains, lags) of the rate feedback
+    "ieeet1": (("K_F",), ("T_F",)),
+    "rexsys": (("K_F",), ("T_F",)),
+    "expic1": (("K_F",), ("T_F1",)),
+    "ac7b": (("K_F3",), ("T_F3",)),
+    "esac3a": (("K_F", "K_N"), ("T_F",)),
+    "exni": (("K_F",), ("T_F1", "T_F2")),
+}
+
+
+@pytest.mark.parametrize("name", WITHOUT_FEEDBACK)
+def test_data_without_a_rate_feedback_may_have_0_as_its_lag(name):
+    gains, lags = WITHOUT_FEEDBACK[name]
+    none = dict.fromkeys(gains, 0.0)
+    found, wanted = (exciter(name, none | dict.fromkeys(lags, T)) for T in (0.0, 0.7))
+    assert not refused(found)
+    least = {v.name: v.minimum for v in found.model.parameters}
+    assert {least[f"exciter.{lag}"] for lag in lags} == {0}
+    s = 2j * np.pi
+    own, other = found.response(s, REST), wanted.response(s, REST)
+    assert own["E_fd", "v_t"] == pytest.approx(other["E_fd", "v_t"], rel=1e-9)
+    acts = exciter(name, {gains[-1]: 0.1} | dict.fromkeys(lags, 0.0))
+    assert any(text.startswith(f"exciter.{lags[0]} must be above 0") for text in refused(acts))
+
+
 # -- ceilings -----------------------------------------------------------------------------------
 
 CEILINGS = {

@@ -185,10 +185,13 @@ def test_it_follows_its_diagram_step_by_step(changed):
     assert np.abs(np.array(found) - wanted).max() < 0.01 * np.ptp(wanted)
 
 
+NO_LOAD = {"K_E": 0.0, "K_D": 0.0, "S_E1": 0.0, "S_E2": 0.0}
+
+
 @pytest.mark.parametrize(("share", "v_t"), [(0.0, 0.7), (1.0, 0.7), (0.5, 1.2)])
 def test_its_ceilings_follow_the_terminal_voltage_by_their_share(share, v_t):
     """Without saturation and rectifier F is 1 + F_1IMF·(v_t − 1), and E_fd ends at the exciter's field."""
-    plain = {"K_E": 1.0, "K_D": 0.0, "K_C": 0.0, "S_E1": 0.0, "S_E2": 0.0, "T_E": 0.05}
+    plain = NO_LOAD | {"K_E": 1.0, "K_C": 0.0, "T_E": 0.05}
     for limit in ("V_RMAX", "V_FMAX"):
         own = exciter("rexsys", plain | {limit: 4.0, "F_1IMF": share})
         found, _ = integrated(own, lambda t: [v_t, E_FD, 0.8], 0.5)
@@ -205,6 +208,8 @@ def test_its_ceilings_follow_the_terminal_voltage_by_their_share(share, v_t):
         ({"V_RMAX": 2.0}, "exciter.V_RMAX"),
         ({"V_FMAX": 2.0}, "exciter.V_FMAX"),
         ({"K_VP": 1.0, "V_IMAX": 0.5}, "exciter.V_IMAX"),
+        (NO_LOAD, "exciter: K_E + K_D + S_E must exceed 0 at the start"),
+        ({"T_F": 0.0, "K_F": 0.1}, "exciter.T_F must be above 0"),
     ],
 )
 def test_what_cannot_be_is_refused_by_its_name(values, said):

@@ -54,7 +54,7 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and
 
 _MOST = 1e9  # no upper limit of V_E [pu]
-_LEAST = 1e-3  # smallest V_E [pu] that the rectifier's loading is divided by
+_LEAST = 1e-3  # smallest V_E [pu], and smallest K_E + S_E, that something is divided by
 
 ALTERNATOR = (
     pu("K_E", 1.0, "Exciter constant"),
@@ -138,7 +138,7 @@ class Alternator:
 
     @property
     def constant(self) -> Expr:
-        """K_E + S_E(V_E) [pu], at least a small number."""
+        """K_E + S_E(V_E) [pu]."""
         return self._constant(self.V_E)
 
     @property
@@ -152,7 +152,7 @@ class Alternator:
         return self.V_E * rectifier(self.p.K_C * self.seen.I_fd / fmax(self.V_E, _LEAST))
 
     def _constant(self, V_E: Expr) -> Expr:
-        return fmax(self.p.K_E + self.curve.part(V_E) / fmax(V_E, _LEAST), _LEAST)
+        return self.p.K_E + self.curve.part(V_E) / fmax(V_E, _LEAST)
 
     def drive(self, V_R: Expr, low: Scalar = 0.0, high: Scalar = _MOST) -> None:
         """Close V_E, driven by V_R, within its limits."""
@@ -170,7 +170,7 @@ class Alternator:
             low = V_EMIN
             names = ("exciter.V_EMIN", "exciter.V_EMIN")
             require_within(self.m, self.V_E_0, low, _MOST, names)
-        highest = (V_FEMAX - self.p.K_D * self.seen.I_fd) / self.constant
+        highest = (V_FEMAX - self.p.K_D * self.seen.I_fd) / fmax(self.constant, _LEAST)
         self.drive(V_R, low, fmax(highest, low))
 
 

@@ -180,10 +180,17 @@ def rate_feedback(
 ) -> tuple[Expr, Expr]:
     """s·K_F/(1 + s·T_F) of a signal, and K_F."""
     gain_F = gain(m, "K_F", K_F, "Rate feedback; 0 leaves it out", 0)
-    lag = m.parameter("T_F", T_F, "s", "Lag of the rate feedback", minimum=1e-3, source=SOURCE)
+    lag = lag_of_feedback(m, time(m, "T_F", T_F, "Lag of the rate feedback"), gain_F)
     x = m.state(name, initial, "pu", "rate feedback, slow part of the signal", base=E_FD)
     m.derivative(x, (u - x) / lag)
     return gain_F / lag * (u - x), gain_F
+
+
+def lag_of_feedback(m: ModelBuilder, T: Expr, acts: Expr) -> Expr:
+    """Return the lag [s] of a rate feedback, which is 0 in data without one; ``acts``: its gain [pu]."""
+    rule = f"{T.name()} must be above 0 where the rate feedback has a gain: raise it, or take 0 as the gain"
+    m.require(if_else(logic_and(T <= 0, acts > 0), -1, 1), rule)
+    return if_else(T <= 0, BYPASS_TIME, T)
 
 
 class Controller:

@@ -29,6 +29,7 @@ from fmus.synchronous_generator.excitation.common import (
     Measurement,
     Regulated,
     exciter_saturation,
+    lag_of_feedback,
     rate_feedback,
     require_within,
 )
@@ -58,7 +59,7 @@ EXPIC1 = (
     pu("V_RMAX", 9.0, "Upper limit of V_R"),
     pu("V_RMIN", -9.0, "Lower limit of V_R"),
     pu("K_F", 0.0, "Rate feedback; 0 leaves it out", 0),
-    seconds("T_F1", 1.0, "First lag of the rate feedback", 1e-3),
+    seconds("T_F1", 1.0, "First lag of the rate feedback"),
     seconds("T_F2", 0.0, "Second lag of the rate feedback; 0 leaves it out"),
     pu("E_FDMAX", 9.0, "Highest voltage into the exciter"),
     pu("E_FDMIN", -9.0, "Lowest voltage into the exciter"),
@@ -92,7 +93,7 @@ AC7B = (
     pu("K_F1", 0.2, "Feedback of E_fd", 0),
     pu("K_F2", 0.0, "Feedback of the field current", 0),
     pu("K_F3", 0.0, "Rate feedback of the field current; 0 leaves it out", 0),
-    seconds("T_F3", 1.0, "Lag of the rate feedback", 1e-3),
+    seconds("T_F3", 1.0, "Lag of the rate feedback"),
     pu("V_FEMAX", 999.0, "Highest field current, as V_FE"),
     pu("V_EMIN", 0.0, "Lower limit of V_E", 0),
 )
@@ -115,13 +116,14 @@ def expic1(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         slow = m.state("feedback_2", E_0, "pu", "Field voltage through T_F2", base="E_fd")
         seen_by_rate = if_else(p.T_F2 > 0, slow, E)
         x = m.state("feedback", E_0, "pu", "rate feedback, slow part of the signal", base="E_fd")
-        m.derivative(x, (seen_by_rate - x) / p.T_F1)
+        T_F1 = lag_of_feedback(m, p.T_F1, p.K_F)
+        m.derivative(x, (seen_by_rate - x) / T_F1)
         m.require(
             if_else(logic_and(p.K_F > 0, p.T_E + p.T_F2 <= 0), -1, 1),
             "exciter.K_F > 0 needs exciter.T_E > 0 or exciter.T_F2 > 0",
         )
         measured = Measurement(m, seen)
-        error = measured.error(0.0) - p.K_F / p.T_F1 * (seen_by_rate - x)
+        error = measured.error(0.0) - p.K_F / T_F1 * (seen_by_rate - x)
         V_A = limited_proportional_integral(
             m, "regulator", error, p.K_A * p.T_A1, p.K_A, low=p.V_R2, high=p.V_R1, initial=V_R0
         )
@@ -179,8 +181,9 @@ def ac7b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         require_within(m, V_A0, p.V_AMIN, p.V_AMAX, ("exciter.V_AMIN", "exciter.V_AMAX"))
         require_within(m, first_0, p.V_RMIN, p.V_RMAX, ("exciter.V_RMIN", "exciter.V_RMAX"))
         x = m.state("feedback", V_R0, "pu", "rate feedback, slow part of the signal", base="E_fd")
-        m.derivative(x, (behind.V_FE - x) / p.T_F3)
-        V_F = p.K_F3 / p.T_F3 * (behind.V_FE - x)
+        T_F3 = lag_of_feedback(m, p.T_F3, p.K_F3)
+        m.derivative(x, (behind.V_FE - x) / T_F3)
+        V_F = p.K_F3 / T_F3 * (behind.V_FE - x)
         measured = Measurement(m, seen)
         control = Controller(m, gains, first_0, (p.V_RMIN, p.V_RMAX))
         first = control(measured.error(control.error_at_start) - V_F)

@@ -26,6 +26,7 @@ from fmus.synchronous_generator.excitation.common import (
     SOURCE,
     Measurement,
     Regulated,
+    lag_of_feedback,
     lead_lag_stage,
     rate_feedback,
     require_within,
@@ -46,7 +47,7 @@ ESAC3A = (
     pu("V_EMIN", 0.0, "Lower limit of V_E", 0),
     pu("K_R", 3.77, "Constant of the regulator's supply", 1e-3),
     pu("K_F", 0.143, "Rate feedback of E_fd up to E_FDN; 0 leaves it out", 0),
-    seconds("T_F", 1.0, "Lag of the rate feedback", 1e-3),
+    seconds("T_F", 1.0, "Lag of the rate feedback"),
     pu("K_N", 0.05, "Rate feedback of E_fd beyond E_FDN", 0),
     pu("E_FDN", 2.36, "Field voltage at which the rate feedback changes"),
     pu("V_FEMAX", 16.0, "Highest field current, as V_FE"),
@@ -124,6 +125,6 @@ def _rate_feedback_of_two_gains(m: ModelBuilder, p: Given, E_fd: Expr, E_0: Expr
         return p.K_F * fmin(E, p.E_FDN) + p.K_N * fmax(E - p.E_FDN, 0)
 
     x = m.state("feedback", weighed(E_0), "pu", "rate feedback, slow part", base="E_fd")
-    V_F = (weighed(E_fd) - x) / p.T_F
+    V_F = (weighed(E_fd) - x) / lag_of_feedback(m, p.T_F, p.K_F + p.K_N)
     m.derivative(x, V_F)
     return V_F

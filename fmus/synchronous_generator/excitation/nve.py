@@ -19,6 +19,7 @@ from fmus.synchronous_generator.excitation.common import (
     SOURCE,
     Measurement,
     Regulated,
+    lag_of_feedback,
     require_within,
 )
 from fmus.toolchain.blocks import limited_low_pass
@@ -31,8 +32,8 @@ EXNI = (
     pu("V_RMAX", 4.0, "Upper limit of V_R"),
     pu("V_RMIN", -4.0, "Lower limit of V_R"),
     number("K_F", 0.011, "Gain of the rate feedback", 0),
-    seconds("T_F1", 0.4, "First lag of the rate feedback", 1e-3),
-    seconds("T_F2", 0.7, "Second lag of the rate feedback", 1e-3),
+    seconds("T_F1", 0.4, "First lag of the rate feedback"),
+    seconds("T_F2", 0.7, "Second lag of the rate feedback"),
     FIELD_RESISTANCE,
 )
 
@@ -47,12 +48,13 @@ def exni(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         measured = Measurement(m, seen)
         lagged = m.state("feedback_lag", V_R0, "pu", "V_R behind T_F2", base="E_fd")
         washed = m.state("feedback_washout", V_R0, "pu", "V_R behind T_F2 and T_F1", base="E_fd")
-        V_F = p.K_F / p.T_F1 * (lagged - washed)
+        T_F1, T_F2 = (lag_of_feedback(m, T, p.K_F) for T in (p.T_F1, p.T_F2))
+        V_F = p.K_F / T_F1 * (lagged - washed)
         error = measured.error(V_R0 / p.K_A) - V_F
         V_R = limited_low_pass(
             m, "amplifier", p.K_A * error, p.T_A, p.V_RMIN, p.V_RMAX, initial=V_R0
         )
-        m.derivative(lagged, (V_R - lagged) / p.T_F2)
-        m.derivative(washed, (lagged - washed) / p.T_F1)
+        m.derivative(lagged, (V_R - lagged) / T_F2)
+        m.derivative(washed, (lagged - washed) / T_F1)
         E = supply.times(V_R, seen.terminal_voltage(supply.times(V_R, measured.nearly)))
         return measured.close(through_resistance(E, seen.I_fd, p.r_C_over_r_FD))

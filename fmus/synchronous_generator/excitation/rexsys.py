@@ -65,6 +65,10 @@ def rexsys(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         p, behind = declared(m, REXSYS, SOURCE), alternator(m, seen)
         E_0, V_C0 = seen.start.E_fd, behind.V_FE_0
         scale_0 = _scale(behind, p.F_1IMF, seen.start.v_t, behind.constant_0)
+        m.require(
+            behind.constant_0 + behind.p.K_D - _NO_GAIN,
+            "exciter: K_E + K_D + S_E must exceed 0 at the start, as its limits are times it; raise K_E",
+        )
         m.require(p.K_VP + p.K_VI - _NO_GAIN, "exciter: one of K_VP and K_VI must exceed 0")
         m.require(p.K_IP + p.K_II - _NO_GAIN, "exciter: one of K_IP and K_II must exceed 0")
         V_R0 = p.K_H * V_C0 + _input_at_start(V_C0, p.K_IP, p.K_II)
@@ -108,7 +112,7 @@ def rexsys(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
 
 def _scale(behind: Alternator, share: Expr, v_t: Expr, constant: Expr) -> Expr:
     """F, by which the limits are multiplied; ``constant``: K_E + S_E(V_E) [pu]."""
-    return fmax(1 + share * (v_t - 1), 0) * (constant + behind.p.K_D)
+    return fmax(1 + share * (v_t - 1), 0) * fmax(constant + behind.p.K_D, 0)
 
 
 def _input_at_start(output: Expr, K_P: Expr, K_I: Expr) -> Expr:
