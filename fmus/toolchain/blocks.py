@@ -208,7 +208,7 @@ def reached(x: Expr, low: Scalar, high: Scalar) -> Expr:
 
 
 def _beyond(x: Expr, low: Scalar, high: Scalar) -> tuple[Expr, Expr]:
-    """Whether a state lies above and below its limits by more than rounding."""
+    """Return whether a state lies above and below its limits, by more than rounding."""
     return x > high + ROUNDING, x < low - ROUNDING
 
 
