@@ -5,13 +5,24 @@ from fmus.toolchain.dyr_form import records_beside
 _RECORDS = records_beside(__file__)
 _OF_BUS = "plants"  # kind of a controller of several units, whose record is of a bus
 
-PLANT_RECORDS = {name: record for name, record in _RECORDS.items() if record.kind != _OF_BUS}
+_SAME = {"REPCTA1": "REPCA1"}
+"""Names of records that are another by its fields and its model: PSS/E has REPCTA1 beside wind turbines of type 3."""
+
+
+def model_of_record(name: str) -> str:
+    """Return the name under which a plant's model is known here, by PSS/E's name of a record of it."""
+    return _SAME.get(name, name)
+
+
+PLANT_RECORDS = {
+    name: record
+    for own, record in _RECORDS.items()
+    if record.kind != _OF_BUS
+    for name in (own, *(other for other, same in _SAME.items() if same == own))
+}
 """By PSS/E's name: the kind ``converter`` is the current source and its model, ``electrical`` says what it feeds,
 ``plant`` sets the references, and the others are of a wind turbine; ``part`` of the plant's controller is the model
 with it."""
-
-SAME_RECORDS = {"REPCTA1": "REPCA1"}
-"""Names of records that are another by its fields and its model: PSS/E has REPCTA1 beside wind turbines of type 3."""
 
 PLANT_MODEL = "wecc_plant_phasor"
 """The model that is made of any of these records."""

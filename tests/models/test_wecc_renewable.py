@@ -310,6 +310,7 @@ def test_an_operating_point_beyond_a_limit_is_refused(values, words):
 def test_a_record_has_the_fields_of_the_program():
     """ICONs and CONs of PSS/E's model library."""
     first = {"REGCA1": 1 + 14, "REECA1": 6 + 45, "REECB1": 5 + 25, "REPCA1": 7 + 27}
+    first |= {"REPCTA1": first["REPCA1"]}
     others = {"REECC1": 5 + 45, "REECD1": 83, "REGCB1": 9, "REGCC1": 15}
     turbine = {"WTDTA1": 5, "WTARA1": 2, "WTPTA1": 10, "WTTQA1": 1 + 15}
     at_a_unit = {"REAX3BU1": 1 + 7, "REAX4BU1": 1 + 7}

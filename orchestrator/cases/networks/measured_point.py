@@ -14,8 +14,8 @@ class MeasuredPoint:
     near: int
     far: int
     circuit: str
-    place: str = ""
-    record: str = "REPCA1"
+    place: str
+    record: str
     of_voltage: bool = False
 
     @property

@@ -35,7 +35,7 @@ def measured_sources(draft: Draft, name: str, own_bus: str) -> list[tuple[str, s
     if point is None or draft.grid is None:
         return []
     try:
-        found = find_point(draft, point, own_bus, point.record)
+        found = find_point(draft, point, own_bus)
     except InputError as error:
         draft.note(point.place, f"{name}: {error}")
         inputs = OF_VOLTAGE if point.of_voltage else INPUTS
@@ -62,7 +62,7 @@ def start_measured_points(draft: Draft, flow: PowerFlow) -> None:
         if name not in draft.system.components:
             continue
         plan = draft.system.components[name]
-        found = find_point(draft, point, buses[name], point.record)
+        found = find_point(draft, point, buses[name])
         if point.of_voltage:
             plan.parameters["held.v_0"] = abs(flow.voltages[found.bus])
             continue
@@ -85,26 +85,28 @@ def power_into(name: str, flow: PowerFlow) -> complex:
     return complex(into + 1j * line.charging[0] * abs(v) ** 2)
 
 
-def find_point(draft: Draft, point: MeasuredPoint, own_bus: str, record: str) -> FoundPoint:
+def find_point(draft: Draft, point: MeasuredPoint, own_bus: str) -> FoundPoint:
     """Return the place of a measured point in the network; an `InputError` where it is not there.
 
-    ``own_bus``: of the controller; ``record``: its record's name."""
+    ``own_bus``: of the controller."""
     assert draft.network is not None
     bus = bus_name(str(point.bus)) if point.bus else own_bus
-    remedy = f"correct it, or write {without_models([record])}, and the references are constant"
+    remedy = (
+        f"correct it, or write {without_models([point.record])}, and the references are constant"
+    )
     if point.of_voltage:
         remedy = "correct it, or write 0 for its own bus"
     if bus not in draft.network.buses:
         raise InputError(
-            f"{record} measures at bus {point.bus}, which the network has not; {remedy}"
+            f"{point.record} measures at bus {point.bus}, which the network has not; {remedy}"
         )
     if not point.near:
         return FoundPoint(bus)
     line = line_of_numbers(draft, point.near, point.far, point.circuit)
     if line is None:
         raise InputError(
-            f"{record} measures the branch {point.near}-{point.far}, circuit {point.circuit!r}, which is no line or "
-            f"transformer of two windings of the network; {remedy}"
+            f"{point.record} measures the branch {point.near}-{point.far}, circuit {point.circuit!r}, which is no line "
+            f"or transformer of two windings of the network; {remedy}"
         )
     return FoundPoint(bus, line.name, is_far=line.from_bus != bus_name(str(point.near)))
 

@@ -115,7 +115,7 @@ def _measured(draft: Draft, one: PlantController) -> Iterator[tuple[str, str]]:
 
 def _place_of(draft: Draft, one: PlantController) -> FoundPoint | None:
     try:
-        return find_point(draft, one.point, bus_name(str(one.record.bus)), CONTROLLER)
+        return find_point(draft, one.point, bus_name(str(one.record.bus)))
     except InputError as error:
         draft.note(one.point.place, f"{one.name}: {error}")
         return None

@@ -63,7 +63,7 @@ def machine_models(
     left = {name.upper() for name in leaving_out}
     _refuse_absent([name for name in leaving_out if name != WITHOUT_RECORD], records)
     # a load may have the identifier of the machine at its bus
-    records = [record for record in records if not names_load(record.name)]
+    records = [record for record in records if not names_load(record.model)]
     found = PartsOfMachines(machines, left, approximate=approximate)
     for record in records:
         found.take(record)
@@ -96,6 +96,17 @@ def machine_models(
             if {"machine", "converter"} & {*found.parts[key]} and key not in following | static
         }
     )
+
+
+def machines_without_record(
+    records: Sequence[DynamicRecord], machines: Sequence[Machine]
+) -> list[tuple[int, str]]:
+    """Return the machines of which the file has no record, by bus and identifier.
+
+    What the network calls infinite needs none."""
+    recorded = {(record.bus, record.machine) for record in records if not names_load(record.model)}
+    keys = [(one.bus, one.name.strip()) for one in machines if not one.is_infinite]
+    return [key for key in keys if key not in recorded]
 
 
 def _static_machines(

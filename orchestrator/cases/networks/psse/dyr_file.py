@@ -8,7 +8,6 @@ from functools import lru_cache
 from pathlib import Path
 
 from fmus.toolchain.dyr_form import DyrField
-from fmus.wecc_renewable.dyr_records import SAME_RECORDS
 from orchestrator.core.errors import InputError, number_of
 from orchestrator.core.foreign_files import read_text, visible
 from orchestrator.core.units import LARGEST
@@ -27,14 +26,20 @@ _OF_PLANTS = ("PLNTBU1", "REAX3BU1", "REAX4BU1")  # models of PSS/E that files w
 
 _OF_BUS = "USRBUS"  # a user's model of a bus: its name stands where others have a machine
 
-NUMBERED = ("VTGTPAT", "VTGDCAT", "FRQTPAT", "FRQDCAT")
-"""Relays whose records begin with a number of their own, where others have a bus."""
+OF_USERS = ("VTGTPA", "VTGDCA", "FRQTPA", "FRQDCA")
+"""Relays that are written as a user's model."""
+
+NUMBERED = (*(f"{name}T" for name in OF_USERS), *OF_USERS)
+"""Relays whose records begin with a number of their own, where others have a bus; the same as models of PSS/E first."""
 
 OF_SHUNTS = {"SVSMO1T2": False, "SVSMO1T3": True}
 """Models of switched shunts, and whether the shunt's identifier follows the name: it does from revision 35 on."""
 
 OF_FACTS = ("CSTCNT",)
 """Records of a FACTS device that are its model."""
+
+AT_BUS = " AT "
+"""Stands between a model and the bus whose records of it are left out."""
 
 ONLY_SHUNT = "1"
 """Identifier of a switched shunt where there is only one at a bus."""
@@ -65,6 +70,16 @@ class DynamicRecord:
     @property
     def place(self) -> str:
         return f"{self.file}, line {self.line}"
+
+    @property
+    def model(self) -> str:
+        """Return the name of its model alone, where ``name`` is that of its bus as well."""
+        return self.name.partition(AT_BUS)[0]
+
+    @property
+    def name_at_bus(self) -> str:
+        """Return the name that is of the records of its model at its bus alone, as ``WSIEG1 AT 3106``."""
+        return f"{self.model}{AT_BUS}{self.bus}"
 
 
 def read_dyr(path: Path) -> list[DynamicRecord]:
@@ -127,15 +142,14 @@ def _record(file: str, line: int, tokens: Sequence[str], names: int) -> DynamicR
             f"{' '.join(tokens[:4])!r} is no record; one is bus 'MODEL' id values … /",
         )
     name, machine, values = tokens[1].upper(), tokens[2].strip(), tuple(tokens[3:])
-    name = SAME_RECORDS.get(name, name)
     if name == _OF_BUS:
         name = machine.upper()
         values = _behind_counts(values) if name in _OF_PLANTS else values
         return DynamicRecord(file, line, int(tokens[0]), name, "", values)
     if name in _OWN_MODELS and values:
         name, values = values[0].upper(), values[1:]
-        if f"{name}T" in NUMBERED:
-            return DynamicRecord(file, line, 0, f"{name}T", "", _of_users_relay(values))
+        if name in OF_USERS:
+            return DynamicRecord(file, line, 0, name, "", _of_users_relay(values))
         values = _behind_counts(values) if name in _OF_PLANTS else values
     if name in OF_SHUNTS:
         values = values if OF_SHUNTS[name] else (machine, *values)

@@ -21,7 +21,6 @@ from fmus.wecc_renewable.dyr_records import (
     CONTROLLER_RECORD,
     PITCH_OF_TYPE_3,
     PLANT_RECORDS,
-    SAME_RECORDS,
     TYPE_3,
 )
 from orchestrator.cases.networks.psse.air_conditioners import AIR_CONDITIONERS
@@ -133,9 +132,7 @@ def _of_machines() -> Iterator[KnownRecord]:
 def _of_plants() -> Iterator[KnownRecord]:
     for name, record in PLANT_RECORDS.items():
         source = _OF_TYPE_3 if name in (*TYPE_3, PITCH_OF_TYPE_3) else _GENERIC
-        own = KnownRecord(name, _KINDS[record.kind], record.part, source, _of_plant(name))
-        yield own
-        yield from (replace(own, name=x) for x, same in SAME_RECORDS.items() if same == name)
+        yield KnownRecord(name, _KINDS[record.kind], record.part, source, _of_plant(name))
 
 
 def _of_distributed() -> Iterator[KnownRecord]:

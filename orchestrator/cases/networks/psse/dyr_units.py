@@ -288,10 +288,8 @@ def named_by_bus(
 
     What leaves out a model by its name then leaves out the records of one bus alone."""
     named = {name.upper() for name in leaving_out}
-    own = [f"{record.name} AT {record.bus}" for record in records]
     return [
-        replace(record, name=name) if name in named else record
-        for record, name in zip(records, own, strict=True)
+        replace(one, name=one.name_at_bus) if one.name_at_bus in named else one for one in records
     ]
 
 

@@ -50,7 +50,7 @@ def record_uses(
         RecordUse(
             record.file,
             record.line,
-            record.name,
+            record.model,
             *(
                 (UseOfRecord.NOT_USED, "a converter of ours replaces its machine", False)
                 if (record.bus, record.machine) in ours
@@ -73,8 +73,8 @@ def _use_of(
 ) -> tuple[UseOfRecord, str, bool]:
     """Return what became of a record, why, and whether it is of no machine."""
     key = record.bus, record.machine
-    of_load = names_load(record.name)
-    of_plants = record.name in NUMBERED or kind_of(record.name) == _PLANTS
+    of_load = names_load(record.model)
+    of_plants = record.model in NUMBERED or kind_of(record.model) == _PLANTS
     of_none = of_load or of_plants or bool(record.line_of_dc)
     if of_none and record.name in left:
         return UseOfRecord.NOT_USED, "dyr_leave_out names it", False

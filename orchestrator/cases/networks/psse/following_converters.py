@@ -4,6 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 from fmus.grid_following.dyr_approximation import CONVERTER, FIELDS, MODEL, PLANT, approximation
 from fmus.toolchain.dyr_form import DyrField
+from fmus.wecc_renewable.dyr_records import model_of_record
 from orchestrator.cases.form.remedies import replacement_of
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, given_values
 from orchestrator.cases.networks.psse.machine_model import MachineModel
@@ -60,8 +61,7 @@ def followed(
     replaced: list[tuple[int, str]] = [
         (own[0].line, Remark(text, kind)) for kind, text in texts.items()
     ]
-    for record in (record for record in records if record.name == PLANT and PLANT in left):
-        replaced.append(
-            (record.line, f"{PLANT} left out, as dyr_leave_out says: the references are constant")
-        )
+    for record in (r for r in records if model_of_record(r.name) == PLANT and r.name in left):
+        told = f"{record.name} left out, as dyr_leave_out says: the references are constant"
+        replaced.append((record.line, told))
     return parameters, replaced

@@ -4,7 +4,13 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from fmus.wecc_renewable.dyr_records import AT_A_UNIT, ELSEWHERE, PLANT_MODEL
+from fmus.wecc_renewable.dyr_records import (
+    AT_A_UNIT,
+    ELSEWHERE,
+    PLANT_MODEL,
+    PLANT_RECORDS,
+    model_of_record,
+)
 from orchestrator.cases.networks.measured_point import MeasuredPoint
 from orchestrator.cases.networks.unit_row import DoubtOfRecord
 
@@ -14,7 +20,7 @@ ON_SHAFT = ("aerodynamics", "pitch", "torque")
 KINDS_OF_CONVERTERS = ("converter", "electrical", "plant", "shaft", *ON_SHAFT)
 """Kinds of records that a converter is made of."""
 
-OF_PLANTS = ("REPCA1", *AT_A_UNIT)
+OF_PLANTS = tuple(name for name, record in PLANT_RECORDS.items() if record.kind == "plant")
 """Records of controllers of plants, which set the references of a unit."""
 
 SOURCE_IMPEDANCE = {
@@ -78,7 +84,7 @@ def plant_of(names: Mapping[str, str], *, elsewhere: bool) -> tuple[str, dict[st
     is_one_of_several = names.get("plant") in AT_A_UNIT
     if first in _FIRST and besides in PLANT_MODELS and not is_one_of_several:
         return PLANT_MODELS[besides], {}
-    order = [names[kind] for kind in KINDS_OF_CONVERTERS if kind in names]
+    order = [model_of_record(names[kind]) for kind in KINDS_OF_CONVERTERS if kind in names]
     return PLANT_MODEL, {"records": " ".join([*order, *word])}
 
 

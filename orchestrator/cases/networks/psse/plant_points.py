@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 
 from fmus.grid_following.dyr_approximation import PLANT
 from fmus.static_var.dyr_records import STATIC_VAR_RECORDS
+from fmus.wecc_renewable.dyr_records import model_of_record
 from orchestrator.cases.networks.measured_point import MeasuredPoint
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord
 from orchestrator.core.errors import InputError
@@ -22,8 +23,9 @@ def measured_points(
 ) -> dict[tuple[int, str], MeasuredPoint]:
     """Return where the controllers of plants and compensators measure that do not at their own terminal."""
     found = _held_buses(of, parts, problems)
-    for key, record in ((key, r) for key, own in of.items() for r in own if r.name == PLANT):
-        if "plant" in parts[key] and len(record.values) >= _PLACES:
+    for key, record in ((key, r) for key, own in of.items() for r in own):
+        is_plant = model_of_record(record.name) == PLANT
+        if is_plant and "plant" in parts[key] and len(record.values) >= _PLACES:
             try:
                 point = point_of_record(record, key[0])
             except InputError as error:
@@ -80,4 +82,5 @@ def point_of_record(record: DynamicRecord, own_bus: int) -> MeasuredPoint:
             f"{record.name} has BUS1 = {near} and BUS2 = {far}; give both ends of it, or 0 twice",
         )
     circuit = record.values[3].strip()
-    return MeasuredPoint(0 if bus == own_bus else bus, near, far, circuit, record.place)
+    measured = 0 if bus == own_bus else bus
+    return MeasuredPoint(measured, near, far, circuit, record.place, record.name)

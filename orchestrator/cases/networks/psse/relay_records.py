@@ -2,6 +2,7 @@
 
     VTGTPAT, VTGDCAT   bus watched, bus and identifier of the generator; VL, VU [pu], TP, TB [s]
     FRQTPAT, FRQDCAT   the same with FL, FU [Hz]
+    VTGTPA and so on   the same as models of a user (USRMDL)
 
 A record of a generator's relay begins with its number, in the place of a bus. xxxTPAT takes the generator off, xxxDCAT
 its whole bus.
@@ -18,7 +19,7 @@ from orchestrator.core.units import LARGEST
 from orchestrator.systems.coupling.relay_limits import Quantity, RelayLimits
 
 _OF_VOLTAGE = "VTG"  # how the names of relays of generators begin that watch a voltage
-OF_BUSES = ("VTGDCAT", "FRQDCAT")
+OF_BUSES = ("VTGDCAT", "FRQDCAT", "VTGDCA", "FRQDCA")
 
 _OF_UNIT = 7  # the bus watched, bus and identifier of the generator, two limits, two times
 

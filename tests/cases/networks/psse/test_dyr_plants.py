@@ -8,7 +8,6 @@ import xarray as xr
 
 from fmus.wecc_renewable.dyr_records import PLANT_RECORDS
 from orchestrator.cases.case import load_case, with_protection
-from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.core.errors import CaseError
 from tests.cases.networks.psse.test_dyr_following import REGCA1, dyr, prepared, record
 from tests.support.mill import mill_case
@@ -59,13 +58,24 @@ def test_records_are_the_whole_unit_with_its_own_values(electrical, prepared):
     assert plan.parameters.get("electrical.Iq4", 1.2) == 1.2
 
 
-def test_repcta1_is_repca1_under_the_name_it_has_beside_turbines_of_type_3(tmp_path):
+def test_repcta1_is_repca1_under_the_name_it_has_beside_turbines_of_type_3(prepared):
     """PowerWorld's help says so, and a national system's file has as many values under either name."""
-    of_wind, plain = tmp_path / "wind.dyr", tmp_path / "plain.dyr"
-    plain.write_text(PLANT.format(""))
-    of_wind.write_text(PLANT.format("").replace("REPCA1", "REPCTA1"))
-    (found,), (wanted,) = read_dyr(of_wind), read_dyr(plain)
-    assert (found.name, found.values) == (wanted.name, wanted.values)
+    plain, of_wind = PLANT.format(""), PLANT.format("").replace("REPCA1", "REPCTA1")
+    found, wanted = (unit(prepared(dyr(plant=text), "")) for text in (of_wind, plain))
+    assert found.description.model_name == wanted.description.model_name == "regca1_repca1_phasor"
+    assert found.parameters == wanted.parameters
+
+
+def test_repcta1_keeps_its_own_name_in_what_is_said_and_typed(prepared):
+    of_wind = PLANT.format("").replace("REPCA1", "REPCTA1")
+    ready = prepared(dyr(plant=of_wind), 'dyr_leave_out = ["REPCTA1"]')
+    assert unit(ready).description.model_name == "regca1_phasor"
+    assert any("REPCTA1 left out, as dyr_leave_out says" in q.text for q in ready.questions)
+    assert [use.why for use in ready.records if use.kind == "REPCTA1"] == ["dyr_leave_out names it"]
+    with pytest.raises(CaseError, match=r"REPCTA1 measures at bus 12, .*dyr-leave-out REPCTA1"):
+        prepared(dyr(plant=elsewhere("12 0 0").replace("REPCA1", "REPCTA1")), "")
+    with pytest.raises(CaseError, match=r"names 'REPCA1', of which the file has no record"):
+        prepared(dyr(plant=of_wind), 'dyr_leave_out = ["REPCA1"]')
 
 
 @pytest.mark.parametrize("circuit", ["0 ", "1", "A", ""])
@@ -234,7 +244,11 @@ TYPE_3 = (
 MADE = {
     "WT3G1 WT3E1 WT3T1 WT3P1": TYPE_3,
     "REGCB1 REECC1": (line("REGCB1", EMF), line("REECC1", BATTERY)),
-    "REGCC1 REECD1 REPCA1": (line("REGCC1", LOOP), line("REECD1", TYPE_D), PLANT.format("1")),
+    "REGCC1 REECD1 REPCA1": (
+        line("REGCC1", LOOP),
+        line("REECD1", TYPE_D),
+        PLANT.format("1").replace("REPCA1", "REPCTA1"),
+    ),
     "REGCA1 REECC1 REPCA1 elsewhere": (
         OF_REGCA1,
         line("REECC1", BATTERY),

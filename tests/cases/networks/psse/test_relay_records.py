@@ -39,7 +39,7 @@ def test_a_relay_of_a_generator_watches_one_bus_and_protects_another(tmp_path):
     voltage, frequency = units(
         tmp_path,
         "1 'VTGTPAT' 5 111 'A' 0.75 5.0 10.0 0.08",
-        "2 'FRQDCAT' 0 112 '1 ' 57 62 1.5 0.1",
+        "2 'FRQDCA' 0 112 '1 ' 57 62 1.5 0.1",
     )
     assert (voltage.record.bus, voltage.watched, voltage.machine) == (0, 5, (111, "A"))
     assert (voltage.quantity, voltage.limits) == ("voltage", RelayLimits(0.75, 5.0, 10.0, 0.08))
@@ -54,7 +54,7 @@ def test_a_relay_written_as_a_users_model_is_the_same(tmp_path):
     (old,) = units(tmp_path, "0 'USRMDL' 0 'VTGTPA' 8 0 6 4 0 1 5 111 'A' 0 0 0 0.75 5 10 0.08")
     (new,) = units(tmp_path, "1 'VTGTPAT' 5 111 'A' 0.75 5.0 10.0 0.08")
     assert (old.machine, old.watched, old.limits) == (new.machine, new.watched, new.limits)
-    assert old.record.name == "VTGTPAT"
+    assert old.record.name == "VTGTPA"
 
 
 def test_each_stage_of_a_load_relay_is_one_and_an_empty_one_is_none(tmp_path):
