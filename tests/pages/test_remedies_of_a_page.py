@@ -13,6 +13,7 @@ PRINTED = (
     remedies.without_models([WITHOUT_RECORD]),
     remedies.APPROXIMATING,
     remedies.replacement_of("3"),
+    remedies.replacement_of(WITHOUT_RECORD),
     remedies.with_frequency(60.0),
     remedies.with_slack("sg1"),
     remedies.KEEPING_LIMITS,

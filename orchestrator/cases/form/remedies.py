@@ -13,7 +13,7 @@ def without_kinds(kinds: Sequence[str]) -> str:
 
 def without_models(names: Sequence[str]) -> str:
     """Return the same for records of dynamics data, by the names of their models."""
-    options = [(Option.DYR_LEAVE_OUT, f'"{n}"' if " " in n else n) for n in names]
+    options = [(Option.DYR_LEAVE_OUT, _quoted(name)) for name in names]
     return f"dyr_leave_out = {_toml_list(names)} in [units] (" + command("new", *options) + ")"
 
 
@@ -24,7 +24,7 @@ def replacement_of(unit: str) -> str:
 
 def replacements_of(units: Sequence[str]) -> str:
     """Return the same for several machines."""
-    typed = command("new", *((Option.REPLACE, unit) for unit in units))
+    typed = command("new", *((Option.REPLACE, _quoted(unit)) for unit in units))
     return f"replace = {_toml_list(units)} in [units] (" + typed + ")"
 
 
@@ -42,6 +42,11 @@ def with_slack(name: str) -> str:
 APPROXIMATING = "dyr_approximate = true in [units] (`gfor new --dyr-approximate`)"
 WITHOUT_PARTS = "keep_load_parts = false in [network] (`gfor new --no-load-parts`)"
 KEEPING_LIMITS = "reactive_limits = true in [power_flow] (`gfor new --reactive-limits`)"
+
+
+def _quoted(word: str) -> str:
+    """Return a value of an option as it is typed."""
+    return f'"{word}"' if " " in word else word
 
 
 def _toml_list(names: Sequence[str]) -> str:

@@ -13,7 +13,7 @@ from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.flow.source_impedances import source_impedance
 from orchestrator.cases.form.csv_rows import rows_of
 from orchestrator.cases.networks.data import bus_name
-from orchestrator.cases.networks.psse.dyr_mistakes import share_of_power
+from orchestrator.cases.networks.psse.dyr_mistakes import WITHOUT_RECORD, share_of_power
 from orchestrator.cases.networks.psse.machine_model import STATIC
 from orchestrator.cases.networks.record_use import details, in_one_line
 from orchestrator.cases.new.converter_places import ConverterPlace
@@ -93,7 +93,7 @@ class CaseText:
             called = "converter" if len(self._places) == 1 else p.name
             holding = f"at {p.bus} it holds the {p.v_pu:g} pu of the base"
             lines.append(f"{called}: {what}; {holding}; {_dispatch(p)}")
-        lines += [self._about_replacement(unit) for unit in self._wanted.replace]
+        lines += self._about_replacements()
         if "dyr" not in self._sources:
             lines.append(
                 "machines: no dynamics data, so all are a steam turbine's with exciter ST1: typical data"
@@ -136,8 +136,31 @@ class CaseText:
     @property
     def _replacements(self) -> str:
         """Tell which converters of ours stand in place of machines of the files, as the end of a title."""
-        named = [f"gfor{unit} for unit {unit}" for unit in self._wanted.replace]
+        named = [f"gfor{unit} for unit {unit}" for unit in self._replaced_by_name]
+        if WITHOUT_RECORD in self._wanted.replace:
+            named.append("converters for machines without a record")
         return f", but with our {few(named, _MOST_REPLACED)}" if named else ""
+
+    @property
+    def _replaced_by_name(self) -> list[str]:
+        return [unit for unit in self._wanted.replace if unit != WITHOUT_RECORD]
+
+    def _about_replacements(self) -> list[str]:
+        """Tell what converters of ours replace: each that is asked for by its unit, and the others together."""
+        lines = [self._about_replacement(unit) for unit in self._replaced_by_name]
+        if WITHOUT_RECORD not in self._wanted.replace or self._base is None:
+            return lines
+        fed = self._fed()
+        table = self._base.case.table.units
+        model = table.converter if table else ""
+        by_name = {f"gfor{unit}" for unit in self._replaced_by_name}
+        plans = self._base.system.components
+        others = [x for x in fed if plans[x].description.model_name == model and x not in by_name]
+        share = share_of_power(sum(fed[name] for name in others), sum(fed.values()))
+        converters = number_of(len(others), "grid-forming converter")
+        named = few(others, _MOST_REPLACED)
+        told = f"machines without a record: {converters} of ours with a droop ({named}), {share}"
+        return [*lines, told]
 
     def _about_replacement(self, unit: str) -> str:
         """Tell what a converter of ours replaces, and with how much power."""
@@ -154,17 +177,23 @@ class CaseText:
     def _about_static(self) -> list[str]:
         """Tell how much power comes from machines without a record, which are constant currents."""
         plans = self._base.system.components if self._base else {}
-        fed = dict[str, float]()
-        for port in self._network.ports if self._network else ():
-            plan = plans.get(port.name)
-            if plan is not None and {"P_0", "S_n"} <= plan.description.variables.keys():
-                fed[port.name] = plan.number("P_0") * plan.number("S_n")
+        fed = self._fed()
         static = [name for name in fed if plans[name].description.model_name == STATIC]
         share = share_of_power(sum(fed[name] for name in static), sum(fed.values()))
         if not static or not share:
             return []
         machines = number_of(len(static), "constant current")
         return [f"machines without a record: {machines}, {share}"]
+
+    def _fed(self) -> dict[str, float]:
+        """Return the active power of each unit in the base case [MW]."""
+        plans = self._base.system.components if self._base else {}
+        fed = dict[str, float]()
+        for port in self._network.ports if self._network else ():
+            plan = plans.get(port.name)
+            if plan is not None and {"P_0", "S_n"} <= plan.description.variables.keys():
+                fed[port.name] = plan.number("P_0") * plan.number("S_n")
+        return fed
 
     def _moves(self) -> str:
         """Tell which taps and shunts moved, and that they do after an outage."""

@@ -24,8 +24,10 @@ from orchestrator.cases.form.schema import ComponentTable, UnitsTable
 from orchestrator.cases.form.unusual_value import UnusualValue
 from orchestrator.cases.networks.conversion import Generation
 from orchestrator.cases.networks.data import bus_name
+from orchestrator.cases.networks.psse.dyr import machines_without_record
 from orchestrator.cases.networks.psse.dyr_counts import with_needed_counts
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, read_dyr
+from orchestrator.cases.networks.psse.dyr_mistakes import WITHOUT_RECORD
 from orchestrator.cases.networks.psse.dyr_units import (
     at_their_devices,
     completed,
@@ -89,6 +91,7 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
     if table is None or (draft.found.network_failed and table.file is None):
         return {}
     try:
+        table = _with_named_units(draft, table)
         rows, motors = _rows(draft, table)
     except InputError as error:
         if draft.found.network_failed:
@@ -153,6 +156,27 @@ def _rows(draft: Draft, table: UnitsTable) -> tuple[list[UnitRow], Sequence[Moto
     if table.file is None and draft.data is not None:
         rows = with_infinite_buses(rows, draft.data.machines)
     return rows, ()
+
+
+def _with_named_units(draft: Draft, table: UnitsTable) -> UnitsTable:
+    """Return the table with the units by name where it replaces the machines without a record."""
+    if WITHOUT_RECORD not in table.replace:
+        return table
+    machines = draft.data.machines if draft.data else ()
+    units: list[str] = []
+    fault = ""
+    if table.dyr is None:
+        fault = f"{WITHOUT_RECORD!r} is of a file of dynamics data, 'dyr', which is not given; name units"
+    elif machines:
+        records = read_dyr(seen_from_here(draft.given.directory / table.dyr))
+        labels = unit_labels(machines)
+        bare = machines_without_record(at_their_devices(records, machines), machines)
+        units = [labels[key] for key in bare]
+        fault = "" if units else f"{WITHOUT_RECORD!r}, and every machine has a record; take it out"
+    if fault:
+        draft.note(draft.given.place("units", "replace"), fault)
+    others = [label for label in table.replace if label != WITHOUT_RECORD]
+    return table.model_copy(update={"replace": [*others, *units]})
 
 
 def _of_parts(generator: str) -> str:
@@ -506,7 +530,8 @@ def _alphas(draft: Draft, table: UnitsTable, rows: Sequence[UnitRow]) -> dict[st
     alphas = {row.label: table.alpha if row.alpha is None else row.alpha for row in rows}
     for label in table.replace:
         if label not in alphas:
-            hint = close_names(label, alphas, f"there are: {', '.join(alphas)}")
+            known = [*alphas, WITHOUT_RECORD] if table.dyr else [*alphas]
+            hint = close_names(label, known, f"there are: {', '.join(alphas)}")
             draft.note(draft.given.place("units", "replace"), f"there is no unit {label!r}; {hint}")
             continue
         alphas[label] = 1.0

@@ -436,6 +436,22 @@ def test_a_case_names_the_machines_that_a_converter_of_ours_replaces(files):
     assert untouched.table.scenarios["base"].title == "As in the files"
 
 
+def test_a_case_replaces_all_machines_without_a_record_by_one_word(files):
+    dyr = files[1]
+    own = [line for line in dyr.read_text().splitlines() if line.split()[:1] not in (["2"], ["3"])]
+    dyr.write_text("\n".join(own) + "\n")
+    case, new = made(files, None, replace=("machine without record",))
+    title = "As in the files, but with our converters for machines without a record"
+    assert case.table.scenarios["base"].title == title
+    fed, total = POWERS[2] + POWERS[3], sum(POWERS.values())
+    share = f"{fed:.0f} of {total:.0f} MW ({100 * fed / total:.1f} %)"
+    converters = "2 grid-forming converters of ours with a droop (gfor2, gfor3)"
+    assert f"machines without a record: {converters}, {share}" in new.assumed
+    (base,) = case.prepare(["base"])
+    assert {"gfor2", "gfor3", "sg1"} <= {*base.system.components}
+    assert not {"sg2", "sg3"} & {*base.system.components}
+
+
 def test_without_dynamics_data_the_machines_are_typical_and_said(files):
     _, new = made(files[:1])
     assert "machines: no dynamics data" in "".join(new.assumed)

@@ -178,7 +178,7 @@ GALLERY = {
         "is a constant current (static generation)",
         NINE,
         re.sub(rf"(?m)^2,'GENROU'.*\n|^{GENCLS}\n", "", DYR),
-        undo=(('replace = ["2", "3"]', ""),),
+        undo=(('replace = ["machine without record"]', ""),),
     ),
     "exciter of a classical machine": Broken(
         "a constant emf without a field winding", NINE, DYR + SEXS.replace("2 'SEXS'", "3 'SEXS'")

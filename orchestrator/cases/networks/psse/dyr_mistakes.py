@@ -30,7 +30,8 @@ LEAST_STRANGE = (
 _NAMED = 8  # buses that one problem names
 
 WITHOUT_RECORD = "machine without record"
-"""What ``dyr_leave_out`` names so that machines without any record feed their power as a constant current."""
+"""What ``dyr_leave_out`` names so that machines without any record feed their power as a constant current, and
+``replace`` so that converters of the case stand there."""
 
 
 def count_repeats(problems: Sequence[str], first: Mapping[str, str]) -> Iterator[str]:
@@ -87,21 +88,23 @@ def _without_records(
     (bus, name), *others = bare
     share = share_of_power(sum(powers[key] for key in bare), sum(powers.values()))
     feeding = f", {'which feed' if others else 'which feeds'} {share}" * bool(share)
-    begin, end = f"machine {name!r} at bus {bus} has no record of a machine{feeding}; add one", ""
+    begin = f"machine {name!r} at bus {bus} has no record of a machine{feeding}; add one"
     if others:
         named = few((f"{name!r} at bus {bus}" for bus, name in bare), _NAMED)
         begin = f"{len(bare)} machines have no record of a machine ({named}){feeding}; add them"
     replaced = [labels[key] for key in bare]
     if may_be_static:
+        whose = "the power of each" if others else "its power"
         begin += (
-            f", or write {without_models([WITHOUT_RECORD])}, and its power in the RAW file is a constant current "
+            f", or write {without_models([WITHOUT_RECORD])}, and {whose} in the RAW file is a constant current "
             "(static generation)"
         )
-        if len(bare) > _NAMED:
-            replaced, end = replaced[:1], ", for the first of them"
-    return (
-        f"{begin}, or write {replacements_of(replaced)}, and a converter of ours stands there{end}"
-    )
+        if others:
+            return (
+                f"{begin}, or write {replacements_of([WITHOUT_RECORD])}, and a converter of ours stands in the place "
+                "of each"
+            )
+    return f"{begin}, or write {replacements_of(replaced)}, and a converter of ours stands there"
 
 
 def _incomplete(machine: str, own: Mapping[str, str], unit: str) -> Iterator[str]:

@@ -192,8 +192,45 @@ def test_many_machines_without_a_record_are_one_problem_with_one_remedy():
     assert said.startswith("11 machines have no record of a machine ('1' at bus 1, '1' at bus 2, ")
     assert "'1' at bus 8 and 3 more), which feed 110 of 440 MW (25.0 %); add them, or write" in said
     assert said.endswith(
-        "(`gfor new --replace 1`), and a converter of ours stands there, for the first of them"
+        '(`gfor new --replace "machine without record"`), and a converter of ours stands in the place of each'
     )
+
+
+REPLACED = STATIC.replace("dyr_leave_out", "replace")
+
+
+def test_all_machines_without_a_record_are_replaced_by_one_word(tables):
+    found = tables(BARE, PHASORS.replace("[units]", REPLACED))
+    assert "sg3" not in found
+    assert (found["gfor3"].model, found["gfor3"].bus) == ("gfor", "bus_3")
+    assert "gfor1" not in found
+
+
+@pytest.mark.parametrize(
+    ("dyr", "units", "words"),
+    [
+        (DYR, REPLACED, "units.replace: 'machine without record', and every machine has a record"),
+        (
+            BARE + "3 'SEXS' 1 0.1 10.0 100.0 0.05 -5.0 5.0 /\n",
+            REPLACED,
+            "units.replace: 'machine without record', and every machine has a record",
+        ),
+        (
+            BARE,
+            '[units]\nreplace = ["machines without records"]',
+            "no unit 'machines without records'; did you mean machine without record?",
+        ),
+        (
+            "",
+            REPLACED,
+            "units.replace: 'machine without record' is of a file of dynamics data, 'dyr'",
+        ),
+    ],
+)
+def test_a_word_for_machines_without_a_record_that_fits_none_is_refused(dyr, units, words, tables):
+    case = PHASORS if dyr else PHASORS.replace('dyr = "grid.dyr"\n', "")
+    with pytest.raises(CaseError, match=words):
+        tables(dyr or DYR, case.replace("[units]", units))
 
 
 @pytest.mark.slow
