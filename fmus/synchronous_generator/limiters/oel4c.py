@@ -42,6 +42,7 @@ def oel4c(m: ModelBuilder, seen: Regulated) -> Limited:
     moved = moved_edge(m, Q_0 - p.Q_ref, Expr(1))
     Q = (seen.terminal(seen.I_fd) * seen.i.conjugate()).im
     excess = Expr(Q) - p.Q_ref - moved
+    m.output("excess", excess, "pu", "Reactive power beyond Q_ref", base="S_n")
     lasted = time_that_lasts(m, "beyond_for", excess > 0, p.T_delay)
     e = if_else(lasted >= p.T_delay, -excess, 0)
     x = m.state("integrator", 0.0, "pu", "Integral of the error", base="S_n")

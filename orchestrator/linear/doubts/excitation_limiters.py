@@ -1,4 +1,5 @@
-"""Warnings of limiters of excitation that act where a machine starts, or would act there in time."""
+"""Warnings of limiters of excitation: those that act where a machine starts, or would in time, and those that at the
+end of a run hold what needs no limit, or rest although it needs one."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ from orchestrator.systems.coupling.master import Master
 _KINDS = {"oel": "overexcitation", "uel": "underexcitation"}
 _ACTS = "acts"  # output of a limiter: 1 while it acts
 _SIGNAL = "signal"  # what it adds to the voltage reference [pu]
+_LEAST = 1e-6  # signal [pu] from which a limiter acts, as its model has it
 _LATER = {
     "moved": "its edge is taken {} pu farther out",
     "lowered": "its signal is taken {} pu lower",
@@ -19,6 +21,14 @@ _FIELD = "E_fd"
 """Output of a machine: its field voltage [pu], which in steady state is the field current."""
 
 _YES = 0.5  # above it an output says yes
+
+_OF_REACTIVE_POWER = ("excess", "Q_ref", "T_delay", "beyond_for", _SIGNAL)
+"""Variables of a limiter of overexcitation that limits the reactive power: how far it is beyond Q_ref [pu], Q_ref, its
+delay [s], how much of that has passed [s], and its signal."""
+
+_AWAY = 0.01
+"""Distance [pu] from a limit from which on a machine at the end of a run is not at it: the swings that are left of an
+event are below."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +71,37 @@ def limiter_warnings(master: Master, setting: str = Option.SET) -> tuple[str, ..
 
     ``setting``: what is typed before a value by name: where the command itself has no such option, with another."""
     return tuple(text for name in master.components for text in _of_machine(master, name, setting))
+
+
+def warnings_at_end(master: Master) -> tuple[str, ...]:
+    """Warn of limiters that hold the reactive power far below their limit, or rest beyond it; at the end of a run."""
+    return tuple(text for name in master.components if (text := _at_end(master, name)))
+
+
+def _at_end(master: Master, name: str) -> str:
+    component = master.components[name]
+    wanted = [f"oel.{variable}" for variable in _OF_REACTIVE_POWER]
+    if not {*wanted} <= component.description.variables.keys():
+        return ""
+    values = component.values(wanted)
+    excess, limit, delay, passed, signal = (float(values[each]) for each in wanted)
+    when = f"at t = {master.time:.4g} s, the end of the run"
+    limiter = f"limiter of {_KINDS['oel']}"
+    of_limit = f"oel.Q_ref = {limit:g} pu"
+    if signal < -_LEAST and excess < -_AWAY:
+        return (
+            f"{name}: {when}, its {limiter} still holds the voltage reference {-signal:.4g} pu lower, and its reactive "
+            f"power is {-excess:.4g} pu below {of_limit}: the integral does not let go by itself unless oel.T_delay, "
+            f"here {delay:g} s, is 0"
+        )
+    if signal >= -_LEAST and excess > _AWAY:
+        left = max(delay - passed, 0.0)
+        return (
+            f"{name}: {when}, its {limiter} rests, and its reactive power is {excess:.4g} pu beyond {of_limit}: "
+            f"{passed:.3g} s of oel.T_delay = {delay:g} s have passed; let the run go on beyond t = "
+            f"{master.time + left:.4g} s to see it act"
+        )
+    return ""
 
 
 def _of_machine(master: Master, name: str, setting: str) -> Iterator[str]:

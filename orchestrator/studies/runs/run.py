@@ -24,7 +24,7 @@ from orchestrator.devices.fmi.component import Component
 from orchestrator.devices.fmi.instance import is_isolated, protections_of
 from orchestrator.devices.sandbox.protections_in_force import Protection, missing
 from orchestrator.linear.doubts.coupling_growth import coupling_growth
-from orchestrator.linear.doubts.excitation_limiters import limiter_warnings
+from orchestrator.linear.doubts.excitation_limiters import limiter_warnings, warnings_at_end
 from orchestrator.linear.doubts.external_exciters import start_warnings
 from orchestrator.linear.doubts.motor_starts import motor_warnings
 from orchestrator.linear.models.device_start import misfits_of, sentences
@@ -207,6 +207,7 @@ def _run(
         follows = _response_of(master, prepared) if linear else None
         watching: list[Observer] = [*watch.observers, *guards, *observers]
         statistics, failure = _run_to_its_end(master, prepared, watching, checkpoints, engine)
+        at_end = warnings_at_end(master) if failure is None and engine is None else ()
     trips = relays.trips
     if trips:
         prepared = with_trips(prepared, trips)
@@ -220,6 +221,7 @@ def _run(
         *map(str, prepared.about_rows),
         *filter(None, [why_none]),
         *not_known,
+        *at_end,
         *_isolation_warnings(prepared, protections),
     )
     modes = replace(modes, warnings=(*modes.warnings, *about_run))

@@ -3,7 +3,8 @@
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.studies.modes.modes import compute_modes
+from orchestrator.linear.doubts.excitation_limiters import warnings_at_end
+from orchestrator.studies.modes.modes import compute_modes, running
 from orchestrator.studies.runs.run import run_scenario
 from tests.support.scenarios import prepare_one
 
@@ -118,3 +119,23 @@ def test_modes_tell_of_an_operating_point_beyond_a_limiter_that_integrates():
     assert free.electromechanical is not None
     wanted = free.electromechanical.eigenvalue
     assert beyond.electromechanical.eigenvalue == pytest.approx(wanted, rel=1e-6)
+
+
+def test_a_run_tells_of_a_limiter_that_rests_beyond_its_limit_or_holds_on_below_it():
+    """At the end its time still runs, then it limits, then it holds what needs no limit any more."""
+    oel = {"Q_ref": 0.22, "T_delay": 0.1, "K_P": 0.2, "K_I": 2.0}
+    values = {"sg1.oel": "oel4c", **{f"sg1.oel.{name}": value for name, value in oel.items()}}
+    told = []
+    with running(prepared(values)) as master:
+        machine = master.components["sg1"]
+        for raised, end in ((0.05, 0.08), (0.05, 0.4), (-0.02, 0.6)):
+            machine.set({"exciter.delta_V_ref": raised})
+            master.run(end)
+            told.append(warnings_at_end(master))
+        excess = -machine.get(["oel.excess"])["oel.excess"]
+    (rests,), limits, (holds,) = told
+    assert rests.startswith("sg1: at t = 0.08 s, the end of the run, its limiter of overexcitation")
+    assert "pu beyond oel.Q_ref = 0.22 pu: 0.0" in rests
+    assert "of oel.T_delay = 0.1 s have passed; let the run go on beyond t = 0.1" in rests
+    assert limits == ()
+    assert f"its reactive power is {excess:.4g} pu below oel.Q_ref = 0.22 pu: the integral" in holds

@@ -203,7 +203,7 @@ def _of_oel3c(
 def _of_oel4c(
     records: Sequence[DynamicRecord], values: Mapping[str, float]
 ) -> Iterator[DoubtOfRecord]:
-    """Ask about an OEL4C whose limit is 0, or so high that it may be in Mvar."""
+    """Ask about an OEL4C whose limit is 0, or so high that it may be in Mvar, or that does not let go by itself."""
     record = next((one for one in records if REACTIVE_LIMIT in _sets(one.name)), None)
     if record is None or REACTIVE_LIMIT not in values:
         return
@@ -222,6 +222,16 @@ def _of_oel4c(
         )
         kind = f"a limit of {record.name} that nothing reaches"
         yield DoubtOfRecord(REACTIVE_LIMIT, record.place, text, kind)
+    if given["TDELAY"] > 0 and given["KI"] > 0:
+        text = (
+            f"{record.name} has TDELAY = {given['TDELAY']:g} s, with which it does not let go by itself in Dynawo's "
+            "diagram, which is taken: once it has acted, its integral stays where it is while the reactive power is "
+            "below QREF, so that the machine may end below QREF (a run says by how much); what PSS/E does no public "
+            "source tells; with TDELAY = 0 it lets go"
+        )
+        yield DoubtOfRecord(
+            "oel.T_delay", record.place, text, f"{record.name} that does not let go by itself"
+        )
 
 
 def _rests_above(

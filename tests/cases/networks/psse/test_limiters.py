@@ -200,24 +200,26 @@ def test_what_is_doubtful_in_an_oel3c_is_asked_about(values, variable, said, tmp
     assert doubt.text.startswith(said)
 
 
-OEL4C = "1 'OEL4C' 1 {} 12 0.4 0.02 -0.1 /\n"
+OEL4C = "1 'OEL4C' 1 {} {} 0.4 0.02 -0.1 /\n"
+STAYS = "OEL4C has TDELAY = 12 s, with which it does not let go by itself in Dynawo's diagram"
 
 
 @pytest.mark.parametrize(
-    ("given", "taken", "said"),
+    ("given", "delay", "taken", "said"),
     [
-        (0.6, 0.6, ()),
-        (0, 90.0, ("OEL4C has QREF = 0, for which PowerWorld takes the greatest",)),
-        (60, 60, ("OEL4C has QREF = 60, which is per unit of MBASE",)),
+        (0.6, 0, 0.6, ()),
+        (0.6, 12, 0.6, (STAYS,)),
+        (0, 0, 90.0, ("OEL4C has QREF = 0, for which PowerWorld takes the greatest",)),
+        (60, 0, 60, ("OEL4C has QREF = 60, which is per unit of MBASE",)),
     ],
 )
 def test_oel4c_has_its_fields_in_order_and_its_limit_from_the_raw_file_where_it_is_0(
-    given, taken, said, tmp_path
+    given, delay, taken, said, tmp_path
 ):
-    model, uses, asked = read(tmp_path, GENROU + SEXS + OEL4C.format(given))
+    model, uses, asked = read(tmp_path, GENROU + SEXS + OEL4C.format(given, delay))
     own = {n.removeprefix("oel."): x for n, x in model.parameters.items() if n.startswith("oel.")}
     assert model.parts["oel"] == "oel4c"
-    assert own == {"Q_ref": taken, "T_delay": 12, "K_P": 0.4, "K_I": 0.02, "V_min": -0.1}
+    assert own == {"Q_ref": taken, "T_delay": delay, "K_P": 0.4, "K_I": 0.02, "V_min": -0.1}
     assert {use.use for use in uses} == {UseOfRecord.USED}
     assert asked == []
     doubts = [doubt.text for doubt in model.doubts if doubt.variable.startswith("oel")]
