@@ -1,12 +1,13 @@
 """``gfor modes``: steady state and eigenvalues of a case's scenarios."""
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from rich.console import Console
 from rich.markup import escape
 
 from orchestrator.core.errors import InputError
@@ -30,7 +31,7 @@ from orchestrator.face.cli.verdict import (
 from orchestrator.linear.spectra.modes import damping_ratio, in_range
 from orchestrator.output.results.lock import hold_folder
 from orchestrator.studies.modes import beside
-from orchestrator.studies.modes.all_modes import compute_all_modes
+from orchestrator.studies.modes.all_modes import compute_all_modes, without_repeated
 from orchestrator.studies.modes.dead_band_weight import growth_beyond_dead_bands
 from orchestrator.studies.modes.load_model_weight import load_model_weights
 from orchestrator.studies.modes.modes import ModesResult, modes_json
@@ -103,11 +104,14 @@ def _compute(
         results = compute_all_modes(
             prepared, request.frequencies, request.critical, directional=request.directional
         )
-    weights = (
-        [] if options.black_box else load_model_weights(scenarios, results, request.frequencies)
-    )
+    told = without_repeated(results)
+    shown = [first for first, _ in told]
+    weights: list[str] = []
     if not options.black_box:
-        weights += growth_beyond_dead_bands(results)
+        by_name = {scenario.name: scenario for scenario in scenarios}
+        of_shown = [by_name[first.prepared.name] for first in shown]
+        weights += load_model_weights(of_shown, shown, request.frequencies)
+        weights += growth_beyond_dead_bands(shown)
     written, said = [], [*beside.sentences_beside(results)]
     if folder:
         from orchestrator.studies.runs.files import write_modes  # noqa: PLC0415 - plots: a second to import
@@ -117,29 +121,57 @@ def _compute(
         terminal.print_json(modes_json(results, weights, said))
         return exit_code(options, [r.stability for r in results])
     console = terminal.make_console(names=results[0].prepared.names if results else None)
-    answers = [of_modes(r) for r in results]
-    print_answers(console, answers, results, said, details=options.details)
-    terminal.print_warnings(results)
+    answers = [of_modes(r) for r in shown]
+    print_answers(console, answers, shown, [*_repetitions(told), *said], details=options.details)
+    _warn(told)
     terminal.say("question", weights)
-    whole = len(results) == 1 or options.details
-    for result in results:
+    _show(console, shown, options, request)
+    if folder:
+        console.print(escape(f"Modes in {folder}: {', '.join(written)}"), soft_wrap=True)
+    return exit_code(options, [r.stability for r in results])
+
+
+def _warn(told: Sequence[tuple[ModesResult, Sequence[ModesResult]]]) -> None:
+    """Say the warnings of results, and of those that repeat one what it does not say."""
+    terminal.print_warnings([first for first, _ in told])
+    for first, repeated in told:
+        for result in repeated:
+            own = [text for text in result.unasked if text not in first.unasked]
+            terminal.warn(result.prepared.name, own)
+
+
+def _show(
+    console: Console,
+    shown: Sequence[ModesResult],
+    options: argparse.Namespace,
+    request: ModesRequest,
+) -> None:
+    """Print the tables below the answers."""
+    whole = len(shown) == 1 or options.details
+    for result in shown:
         if result.critical is not None and not result.modes:
             none = _none_below(result, result.critical, request.frequencies)
             console.print(escape(none), highlight=False, soft_wrap=True)
         elif whole:
             console.print(all_modes(result, whole=options.details), "")
-    shapes = whole or any(r.named for r in results)
-    terminal.print_named_modes(console, results, shapes=shapes, details=options.details)
-    terminal.print_sources(console, results)
+    shapes = whole or any(r.named for r in shown)
+    terminal.print_named_modes(console, shown, shapes=shapes, details=options.details)
+    terminal.print_sources(console, shown)
     if options.details:
-        print_details(console, results)
+        print_details(console, shown)
     if not whole:
         console.print(
             "All modes of each scenario, and who swings in them: --details, or one --scenario"
         )
-    if folder:
-        console.print(escape(f"Modes in {folder}: {', '.join(written)}"), soft_wrap=True)
-    return exit_code(options, [r.stability for r in results])
+
+
+def _repetitions(told: Sequence[tuple[ModesResult, Sequence[ModesResult]]]) -> Iterator[str]:
+    """Yield a line for each result that others repeat."""
+    for first, repeated in told:
+        if repeated:
+            named = ", ".join(result.prepared.name for result in repeated)
+            own = "their own events" if len(repeated) > 1 else "its own events"
+            yield f"{named}: the same modes as {first.prepared.name}; only {own} come later"
 
 
 def _none_below(result: ModesResult, damping: float, hertz: tuple[float, float]) -> str:

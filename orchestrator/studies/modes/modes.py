@@ -269,6 +269,20 @@ def modes_from(
     )
 
 
+def start_alike(one: PreparedScenario, other: PreparedScenario) -> bool:
+    """Return whether two scenarios start from the same system, so that they have one linear model.
+
+    Events come later, and change none of it."""
+    one, other = in_service(one), in_service(other)
+    return (
+        (one.step_size, one.stop_time, one.schedule)
+        == (other.step_size, other.stop_time, other.schedule)
+        and one.system.components == other.system.components
+        and one.system.connections == other.system.connections
+        and one.system.wires == other.system.wires
+    )
+
+
 def _computed(system: "Linearised") -> ModesResult:
     with side_by_side(pays=system.size > _IN_TURN) as pool:
         system.begin(pool)
@@ -314,21 +328,8 @@ class Linearised:
         """Number of states of the step map."""
         return len(self._model.names)
 
-    def stands_as(self, other: PreparedScenario) -> bool:
-        """Return whether another scenario starts from the same system, so that its linear model is this one.
-
-        Events come later, and change none of it."""
-        own, other = in_service(self._prepared), in_service(other)
-        return (
-            (own.step_size, own.stop_time, own.schedule)
-            == (other.step_size, other.stop_time, other.schedule)
-            and own.system.components == other.system.components
-            and own.system.connections == other.system.connections
-            and own.system.wires == other.system.wires
-        )
-
     def of(self, prepared: PreparedScenario) -> "Linearised":
-        """Return the same under the name of another scenario that `stands_as` it does; nothing is computed again."""
+        """Return the same under the name of a scenario that starts from the same system; nothing is computed again."""
         other = copy.copy(self)
         other._prepared, other.named = prepared, None
         return other

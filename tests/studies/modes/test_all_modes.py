@@ -1,5 +1,6 @@
 """The modes of several scenarios at once are those of each alone, and so are the errors."""
 
+import json
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +10,7 @@ import pytest
 import orchestrator as gfor
 from orchestrator.core.errors import AnalysisError
 from orchestrator.studies.modes import all_modes
-from orchestrator.studies.modes.all_modes import compute_all_modes
+from orchestrator.studies.modes.all_modes import compute_all_modes, without_repeated
 from orchestrator.studies.modes.modes import compute_modes, modes_json
 
 
@@ -48,11 +49,27 @@ def test_each_scenario_gives_what_it_gives_alone_to_the_last_bit(scenarios, watc
 
 def test_scenarios_of_other_events_alone_are_computed_once_and_are_those_of_each_alone(watched):
     told, _ = watched
-    alike = [one.prepared for one in gfor.load("infinite_bus").choose(("dip", "load_step"))]
-    together = compute_all_modes(alike)
-    assert [one.prepared.name for one in together] == ["dip", "load_step"]
-    assert modes_json(together) == modes_json([compute_modes(one) for one in alike])
-    assert told == ["open dip", "close dip"]
+    case = gfor.load("infinite_bus")
+    dip, load_step = (one.prepared for one in case.choose(("dip", "load_step")))
+    other = case.scenario("load_step", {"gfor.droop.R_f": 0.04}).prepared
+    three = [dip, other, load_step]
+    together = compute_all_modes(three)
+    assert [one.prepared for one in together] == three
+    assert modes_json(together) == modes_json([compute_modes(one) for one in three])
+    assert told == ["open dip", "open load_step", "close dip", "close load_step"]
+    assert [len(again) for _, again in without_repeated(together)] == [1, 0]
+
+
+def test_a_scenario_that_repeats_another_is_told_in_one_line(gfor):
+    names = ("--scenario", "dip", "--scenario", "load_step")
+    code, text, error = gfor("modes", "infinite_bus", *names)
+    assert (code, error) == (0, "")
+    assert "load_step: the same modes as dip; only its own events come later" in text
+    assert text.count(" states, residual ") == 1  # the whole table, as of one scenario alone
+    assert "--details, or one --scenario" not in text
+    kept = json.loads(gfor("modes", "infinite_bus", *names, "--json")[1])["scenarios"]
+    assert [one["name"] for one in kept] == ["dip", "load_step"]
+    assert kept[0]["modes"] == kept[1]["modes"]
 
 
 def test_critical_modes_are_those_of_each_alone(scenarios):
