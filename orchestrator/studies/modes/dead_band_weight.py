@@ -16,8 +16,7 @@ from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import CosimError, few
 from orchestrator.core.options import Option
 from orchestrator.core.spelling import Text
-from orchestrator.linear.models.linear_model import LinearModel
-from orchestrator.linear.spectra.loop_growth import edge_of_growth, growth_with
+from orchestrator.linear.spectra.loop_growth import LoopGrowth
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.studies.modes.closed_loops import with_plans
 from orchestrator.studies.modes.modes import ModesResult, compute_modes
@@ -45,10 +44,10 @@ def _growth(result: ModesResult) -> str:
     if not loops or result.stability.stable is False:
         return ""
     try:
-        mode, closed_model = _growth_with(result, _without(prepared, loops))
+        mode, growth = _growth_with(result, _without(prepared, loops))
         if mode is None:
             return ""
-        cycle = _limit_cycle(result.system, closed_model, mode)
+        cycle = _limit_cycle(growth, mode)
     except CosimError:
         return ""  # the question about the band itself stands, with the command
     shares = mode.by_component
@@ -67,11 +66,11 @@ def _growth(result: ModesResult) -> str:
     )
 
 
-def _limit_cycle(model: LinearModel | None, closed: LinearModel | None, mode: Mode) -> str:
+def _limit_cycle(growth: LoopGrowth | None, mode: Mode) -> str:
     """Return what follows of a band's describing function; "" where what grows does not swing."""
-    if model is None or closed is None or not mode.is_oscillation:
+    if growth is None or not mode.is_oscillation:
         return ""
-    edge = edge_of_growth(model, closed, mode.frequency_hz)
+    edge = growth.edge(mode.frequency_hz)
     if edge is None:
         return ""
     gain, hertz = edge
@@ -100,15 +99,19 @@ def swing_over_band(gain: float) -> float:
 
 def _growth_with(
     result: ModesResult, closed: PreparedScenario
-) -> tuple[Mode | None, LinearModel | None]:
-    """The mode that grows fastest with the loops closed, where one does, and the continuous model with them."""
+) -> tuple[Mode | None, LoopGrowth | None]:
+    """The mode that grows fastest with the loops closed, where one does, and the system beside that with them."""
     if result.model.number_of_states > _MOST_STATES:
         if result.system is None:
             return None, None
-        model = with_plans(result, closed)
-        return growth_with(result.system, model), model
+        growth = LoopGrowth(result.system, with_plans(result, closed))
+        return growth.mode(), growth
     found = compute_modes(closed)
-    return (found.stability.mode if found.stability.stable is False else None), found.system
+    if found.stability.stable is not False:
+        return None, None
+    if result.system is None or found.system is None:
+        return found.stability.mode, None
+    return found.stability.mode, LoopGrowth(result.system, found.system)
 
 
 def _ends(prepared: PreparedScenario, loops: Sequence[RestingLoop]) -> Iterator[str]:
