@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 import warnings
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
@@ -387,6 +387,7 @@ class Scenario(Unchanged):
         *,
         continuous: bool = False,
         black_box: bool = False,
+        report: Callable[[str], None] | None = None,
     ) -> LinearSystem:
         """The linear model A, B, C, D around the steady state, with names and the verdict on it.
 
@@ -402,6 +403,8 @@ class Scenario(Unchanged):
             `LinearSystem.to_control` gives the continuous model of either.
         black_box
             Identify the components that hide their states; of those there is the step map alone.
+        report
+            Called with a sentence before what takes long in a large system; such as ``print``.
 
         Raises
         ------
@@ -438,6 +441,7 @@ class Scenario(Unchanged):
             outputs,
             as_continuous=continuous,
             boxes=_boxes("linear_with_boxes", black_box),
+            report=report,
         )
         return LinearSystem(
             **vars(model),

@@ -1,13 +1,16 @@
 """``gfor export linear``: a scenario's A, B, C, D for other tools."""
 
 import argparse
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from orchestrator.core.safe_files import made_folder
 from orchestrator.face.cli.arguments import add_options
 from orchestrator.face.cli.case_arguments import add_case_arguments, chosen
-from orchestrator.face.cli.terminal import make_console, warn
+from orchestrator.face.cli.terminal import make_console, said_stages, warn
 from orchestrator.face.cli.verdict import add_verdict_argument, exit_code, print_stability
+from orchestrator.linear.spectra.slowest_decay import LEAST_STATES
 from orchestrator.linear.spectra.stability import Stability
 from orchestrator.output.report.linearised import exceptions_in_words
 from orchestrator.output.results.staging import new_run_id, staged
@@ -20,6 +23,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_verdict_argument(parser)
 
 
+def _say(report: Callable[[str], None], scenario: str, text: str) -> None:
+    report(f"{scenario}: {text}")
+
+
 def run(options: argparse.Namespace) -> int:
     scenarios = chosen(options)
     folder = made_folder(
@@ -28,13 +35,19 @@ def run(options: argparse.Namespace) -> int:
     verdicts: dict[str, Stability] = {}
     lines, run_id = [], new_run_id()
     for scenario in scenarios:
-        model = scenario.linearize(
-            options.input or (), options.output or (), continuous=options.continuous
-        )
+        with said_stages() as report:
+            model = scenario.linearize(
+                options.input or (),
+                options.output or (),
+                continuous=options.continuous,
+                report=partial(_say, report, scenario.name),
+            )
         verdicts[scenario.title] = model.stability
         warn(scenario.name, model.warnings)
         place = folder / scenario.name
-        with staged(place, run_id) as staging:
+        with said_stages() as report, staged(place, run_id) as staging:
+            if len(model.states) >= LEAST_STATES:
+                _say(report, scenario.name, f"{len(model.states)}² numbers of A are written")
             saved = save_linear_model(
                 model, model.operating_point, model.stability, scenario.prepared, staging
             )

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fmus.toolchain.extras import installed_version
+from orchestrator.core.arrays import Matrix
 from orchestrator.core.late import xr
 from orchestrator.core.safe_files import replacing, write_bytes, write_text
 from orchestrator.output.results.netcdf import netcdf_image, stored_name
@@ -176,6 +177,16 @@ def save_table(rows: Iterable[Mapping[str, Any]], path: Path, names: Sequence[st
     names = list(rows[0]) if rows else names
     writer.writerow([safe_cell(name) for name in names])
     writer.writerows([safe_cell(row.get(name, "")) for name in names] for row in rows)
+    write_text(path, file.getvalue())
+
+
+def save_matrix(matrix: Matrix, rows: Sequence[str], columns: Sequence[str], path: Path) -> None:
+    """Write a matrix as CSV, with the names of its rows and columns."""
+    file = io.StringIO(newline="")
+    writer = csv.writer(file)
+    writer.writerow(["", *map(safe_cell, columns)])
+    for name, numbers in zip(rows, matrix, strict=True):
+        writer.writerow([safe_cell(name), *numbers.tolist()])
     write_text(path, file.getvalue())
 
 

@@ -12,13 +12,21 @@ from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Matrix
 from orchestrator.core.errors import InputError, few
 from orchestrator.core.late import xr
+from orchestrator.core.threads import side_by_side
 from orchestrator.linear.doubts.examination import Examination, examine
 from orchestrator.linear.models.linear_model import LinearModel
-from orchestrator.linear.models.linearization import Blocks, compose, continuous_model
+from orchestrator.linear.models.linearization import (
+    Blocks,
+    compose,
+    continuous,
+    continuous_model,
+)
 from orchestrator.linear.models.state_access import obstacle
 from orchestrator.linear.models.state_space import StateSpace, state_space
 from orchestrator.linear.models.steady_state import OperatingPoint, find_operating_point
-from orchestrator.linear.spectra.stability import judge
+from orchestrator.linear.spectra.modes import Spectrum, find_spectrum
+from orchestrator.linear.spectra.slowest_decay import LEAST_STATES
+from orchestrator.linear.spectra.stability import WHOLE, judge, whole_spectrum
 from orchestrator.studies.modes.modes import running
 from orchestrator.systems.coupling.events import Event, faults_among
 from orchestrator.systems.coupling.master import Master
@@ -79,6 +87,7 @@ def linear_model(
     *,
     as_continuous: bool = False,
     boxes: Callable[..., tuple[StateSpace, OperatingPoint, Examination]] | None = None,
+    report: Callable[[str], None] | None = None,
 ) -> tuple[StateSpace, OperatingPoint, Examination]:
     """The scenario's linear model around its steady state, as step map or continuous, with the verdict on it.
 
@@ -86,7 +95,8 @@ def linear_model(
 
     ``inputs`` and ``outputs``: names ``component.variable``; an output may be a difference ``a.b - c.d``.
     ``as_continuous``: A model in continuous time instead of the map over one communication step.
-    ``boxes``: finds the step map where components hide their states."""
+    ``boxes``: finds the step map where components hide their states.
+    ``report``: called with a sentence before what takes long in a large system."""
     parts = {output: variables_of(output) for output in outputs}
     phasors = [output for output in outputs if "|" in output]
     if phasors:
@@ -104,15 +114,15 @@ def linear_model(
             return _selected(space, select, wanted), point, examined
         point = find_operating_point(master)
         blocks = Blocks(master, inputs=inputs, outputs=outputs, derivatives=True)
-        examined = examine(
-            master, blocks, compose(blocks, master.schedule), continuous_model(master, blocks)
-        )
+        model, system = compose(blocks, master.schedule), continuous_model(master, blocks)
+        of_map, of_system = _spectra(model, system, report)
+        examined = examine(master, blocks, model, system, spectrum=of_map, of_system=of_system)
         if not as_continuous:
             return _selected(state_space(blocks, master.schedule), select, wanted), point, examined
         if not blocks.serves_continuous:
             blocks = Blocks(master, inputs=inputs, outputs=outputs, without_step=True)
         space = state_space(blocks, None)
-        own = judge(LinearModel.from_matrix(space.A, space.states, None))
+        own = judge(continuous(blocks), of_system)
         warnings = examined.warnings
         if examined.stability.stable is None:
             own = replace(own, stable=None, reason=examined.stability.reason)
@@ -122,6 +132,30 @@ def linear_model(
                 *warnings,
             )
         return _selected(space, select, wanted), point, Examination(own, warnings)
+
+
+def _spectra(
+    model: LinearModel, system: LinearModel | None, report: Callable[[str], None] | None
+) -> tuple[Spectrum | None, Spectrum | None]:
+    """All eigenvalues of a step map, with its modes, and of the continuous model, for the verdict on them.
+
+    None for a model that is too large for all of them, or is not there."""
+    states = len(model.names)
+    if report is not None and states >= LEAST_STATES:
+        what = "all eigenvalues" if states <= WHOLE else "what grows"
+        report(f"{what} of {states} states, as `gfor modes` has them, for the verdict on the model")
+    with side_by_side(pays=states >= LEAST_STATES) as pool:
+        of_map = pool.submit(_spectrum_with_modes, model)
+        of_system = pool.submit(_spectrum_of, system)
+        return of_map.result(), of_system.result()
+
+
+def _spectrum_with_modes(model: LinearModel) -> Spectrum | None:
+    return find_spectrum(model) if len(model.names) <= WHOLE else None
+
+
+def _spectrum_of(system: LinearModel | None) -> Spectrum | None:
+    return None if system is None else whole_spectrum(system)
 
 
 def _selected(space: StateSpace, select: Matrix, outputs: Sequence[str]) -> StateSpace:

@@ -19,7 +19,7 @@ from orchestrator.output.results.file_writers import (
     provenance,
     save_json,
     save_matrices,
-    save_table,
+    save_matrix,
 )
 from orchestrator.studies.modes.modes import running
 from orchestrator.systems.coupling.step_awareness import STEP_PARAMETER, knows_step
@@ -116,9 +116,7 @@ def save_linear_model(
         "D": (model.outputs, model.inputs),
     }
     for key, (rows, columns) in entries.items():
-        labelled = zip(rows, matrices[key].tolist(), strict=True)
-        lines = [{"": row, **dict(zip(columns, values, strict=True))} for row, values in labelled]
-        save_table(lines, folder / f"{key}.csv")
+        save_matrix(matrices[key], rows, columns, folder / f"{key}.csv")
     save_json(stability.as_json(), folder / "stability.json")
     return [
         folder / "linear_model.mat",
