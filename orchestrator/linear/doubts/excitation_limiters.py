@@ -75,7 +75,7 @@ def limiter_warnings(master: Master, setting: str = Option.SET) -> tuple[str, ..
 
 def warnings_at_end(master: Master) -> tuple[str, ...]:
     """Warn of limiters that hold the reactive power far below their limit, or rest beyond it; at the end of a run."""
-    return tuple(text for name in master.components if (text := _at_end(master, name)))
+    return tuple(filter(None, (_at_end(master, name) for name in master.components)))
 
 
 def _at_end(master: Master, name: str) -> str:

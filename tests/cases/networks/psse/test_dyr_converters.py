@@ -188,7 +188,7 @@ def test_many_machines_without_a_record_are_one_problem_with_one_remedy():
     bare = {(bus, "1"): {} for bus in range(1, 12)}
     labels = {(bus, "1"): str(bus) for bus, _ in bare}
     powers = dict.fromkeys(bare, 10.0) | {(20, "1"): 330.0}
-    (said,) = records_unfit(bare, (), labels, (), powers)
+    (said,) = records_unfit(bare, (), labels, (), powers, bare)
     assert said.startswith("11 machines have no record of a machine ('1' at bus 1, '1' at bus 2, ")
     assert "'1' at bus 8 and 3 more), which feed 110 of 440 MW (25.0 %); add them, or write" in said
     assert said.endswith(
