@@ -67,6 +67,7 @@ def test_every_verb_only_reads_and_has_a_schema_with_units(answers):
     assert "[Hz]" in str(modes.output_schema)
 
 
+@pytest.mark.slow
 def test_the_built_in_cases_are_listed_with_their_titles(answers):
     _, (_, (listed, *_)) = answers
     found = listed.structured_content["built_in"]
@@ -74,6 +75,7 @@ def test_the_built_in_cases_are_listed_with_their_titles(answers):
     assert all(found.values())
 
 
+@pytest.mark.slow
 def test_each_mode_of_kundurs_system_has_its_own_shape_and_participations(answers):
     """The question of a regulator to another server, which answered with empty vectors (PowerMCP, issue 52)."""
     _, (_, (_, result, *_)) = answers
@@ -90,6 +92,7 @@ def test_each_mode_of_kundurs_system_has_its_own_shape_and_participations(answer
     assert abs(angles["sg1"] - angles["sg2"]) < 20
 
 
+@pytest.mark.slow
 def test_modes_of_a_case_are_those_of_one_scenario_and_short(answers):
     """All scenarios of a case with all that takes part once filled an agent's window: 69,000 characters."""
     _, (_, (*_, result)) = answers
@@ -100,6 +103,7 @@ def test_modes_of_a_case_are_those_of_one_scenario_and_short(answers):
     assert len(result.content[0].text) < 6000
 
 
+@pytest.mark.slow
 def test_hostile_arguments_are_refused_in_words(answers):
     folder, (_, (_, _, outside, option, *_)) = answers
     assert outside.is_error
@@ -110,6 +114,7 @@ def test_hostile_arguments_are_refused_in_words(answers):
     assert not (folder / "x").exists()
 
 
+@pytest.mark.slow
 def test_an_argument_that_a_verb_has_not_is_refused_and_never_dropped(answers):
     _, (tools, (*_, unknown, missing, _, _, _)) = answers
     assert unknown.is_error
@@ -121,6 +126,7 @@ def test_an_argument_that_a_verb_has_not_is_refused_and_never_dropped(answers):
     assert all(tool.input_schema["additionalProperties"] is False for tool in tools)
 
 
+@pytest.mark.slow
 def test_every_refusal_begins_with_its_verb_and_repeats_no_value(answers):
     _, (_, (*_, outside, option, unknown, missing, number, nothing, _)) = answers
     told = [one.content[0].text for one in (outside, option, unknown, missing, number, nothing)]

@@ -502,6 +502,7 @@ def test_threads_that_cannot_be_had_are_refused(gfor, words, said):
     assert said in " ".join(error.split())
 
 
+@pytest.mark.slow
 def test_summary_and_tables_show_the_same_mode(results):
     folder, printed = results
     (scenario,) = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["scenarios"]

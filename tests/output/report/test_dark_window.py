@@ -72,6 +72,7 @@ def texts_in_windows():
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("window", ["light", "dark", "paper"])
 def test_every_text_stands_out(texts, window):
     faint = [one for one in texts[window] if contrast(*one[1:]) < LEAST_CONTRAST]
@@ -79,6 +80,7 @@ def test_every_text_stands_out(texts, window):
     assert len(texts[window]) > 15
 
 
+@pytest.mark.slow
 def test_the_page_is_dark_its_pictures_are_light_and_paper_is_white(texts):
     behind = {
         window: {name: luminance(colour) for name, _, colour in texts[window]} for window in texts

@@ -68,6 +68,7 @@ def test_what_is_needed_is_enough_and_was_foretold(over_g):
     )
 
 
+@pytest.mark.slow
 def test_modes_and_the_network_s_limit_are_those_of_the_eigenvalues(over_g):
     told = [x for x in zip(over_g.values, over_g.figures, strict=True) if x[1].mode is not None]
     assert len(told) > 10

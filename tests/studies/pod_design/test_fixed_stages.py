@@ -146,6 +146,7 @@ def test_where_the_lead_lag_cannot_be_set_the_gain_alone_is_designed(by_gain):
     assert swing < 1e-3 * abs(by_gain.result.achieved)
 
 
+@pytest.mark.slow
 def test_that_it_is_the_gain_alone_is_told(by_gain, tmp_path):
     (said,) = [text for text in by_gain.warnings if text.startswith("only the gain is designed")]
     assert "gfor.pod_p.T_S1; gfor.pod_p.T_S2" in said or "gfor.pod_p.T_S1, gfor.pod_p.T_S2" in said

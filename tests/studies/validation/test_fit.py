@@ -52,6 +52,7 @@ def test_intervals_beside_an_error_that_stays_do_not_hold(recording, monkeypatch
     assert "95 %, does not hold" in found.html()
 
 
+@pytest.mark.slow
 def test_what_did_not_run_is_counted_where_something_is_asked_or_searched(recording):
     """A right model of which nothing is asked: another reading that did not run is in JSON alone."""
     found = gfor_in_python.validate("gfor", recording, values=ON | {"pod_p.K": 120.0})

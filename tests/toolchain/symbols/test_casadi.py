@@ -42,6 +42,7 @@ def test_every_function_gives_the_same_bits(ours, theirs):
     assert np.mean(finite) > 0.9
 
 
+@pytest.mark.slow
 def test_no_function_has_more_instructions(ours, theirs):
     """There are more where an operation is no longer simplified that keeps its value, such as 1·x.
 
