@@ -1,19 +1,23 @@
 """Engines: where the components of a run step if not in this process, and what a user chooses about it."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol, Self
+from typing import TYPE_CHECKING, Protocol, Self
 
 from fmus.toolchain.plugins import PlugIns
-from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
-from orchestrator.devices.fmi.component import Component
 from orchestrator.simulation.waiting_times import PATIENCE, TO_JOIN
-from orchestrator.systems.coupling.master import Master
-from orchestrator.systems.coupling.observers import Observer
-from orchestrator.systems.coupling.system import ComponentPlan
+
+if TYPE_CHECKING:  # an engine's other processes need the choices alone
+    from orchestrator.cases.scenario.prepare import PreparedScenario
+    from orchestrator.devices.fmi.component import Component
+    from orchestrator.systems.coupling.master import Master
+    from orchestrator.systems.coupling.observers import Observer
+    from orchestrator.systems.coupling.system import ComponentPlan
 
 DEFAULT_PORT = 23405  # of a HELICS broker whose address names none
 
