@@ -50,7 +50,12 @@ FLOORS = {
         ("case",),
         ("built_in", "forcing", "new", "use"),
     ),
-    "simulation": (("waiting_times",), ("engine",), ("federation", "interop", "watch")),
+    "simulation": (
+        ("waiting_times",),
+        ("federates",),
+        ("engine",),
+        ("federation", "interop", "watch"),
+    ),
     "output": (("results", "signatures"), ("report",)),
     "studies": (
         ("points", "signals"),

@@ -6,7 +6,8 @@ from orchestrator.core.asked import read_whole
 from orchestrator.core.errors import InputError
 from orchestrator.face.cli.arguments import add_options
 from orchestrator.face.cli.terminal import make_errors
-from orchestrator.simulation.engine import ENGINES, Federates
+from orchestrator.simulation.engine import ENGINES
+from orchestrator.simulation.federates import Federates
 from orchestrator.simulation.waiting_times import PATIENCE, TO_JOIN
 
 

@@ -54,7 +54,7 @@ from orchestrator.output.results.staging import (
     staged,
     unfinished,
 )
-from orchestrator.simulation.engine import Federates
+from orchestrator.simulation.federates import Federates
 from orchestrator.simulation.interop.rules import MASTERS, MasterRules, master_rules
 from orchestrator.studies.modes import beside
 from orchestrator.studies.modes.all_modes import all_ours

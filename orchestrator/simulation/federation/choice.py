@@ -1,6 +1,6 @@
 """Figures and names that all processes of a federation share."""
 
-from orchestrator.simulation.engine import Federates, address_of
+from orchestrator.simulation.federates import Federates, address_of
 
 OWN_NAME = "gfor_cosim"  # name of the federate of gfor itself
 OVER = "the run is over"

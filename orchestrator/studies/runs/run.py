@@ -36,7 +36,8 @@ from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ
 from orchestrator.output.results.file_writers import trajectory_dataset
 from orchestrator.output.results.recording_reader import open_whole
 from orchestrator.output.results.recording_writer import ENDED_EARLY, TRAJECTORY, RecordingFolder
-from orchestrator.simulation.engine import ENGINES, Engine, Federates
+from orchestrator.simulation.engine import ENGINES, Engine
+from orchestrator.simulation.federates import Federates
 from orchestrator.simulation.watch.finding import NOT_JUDGED, UNSTABLE, Finding
 from orchestrator.simulation.watch.relay_trips import relays_in
 from orchestrator.simulation.watch.watch import Watch

@@ -10,7 +10,7 @@ from orchestrator.core.asked import FLAG, FieldKind, read_whole, request_field, 
 from orchestrator.core.cores import MOST_THREADS
 from orchestrator.core.errors import InputError
 from orchestrator.output.results.recording_writer import RecordingFolder
-from orchestrator.simulation.engine import Federates
+from orchestrator.simulation.federates import Federates
 from orchestrator.studies.points.request import ANYTHING
 from orchestrator.studies.runs.checkpoints import EVERY, Checkpoints
 from orchestrator.systems.coupling.observers import Observer
