@@ -6,11 +6,18 @@ from dataclasses import replace
 from fmus.toolchain.model import Model
 from fmus.wecc_renewable.behind_impedance import REGCB1, REGCC1
 from fmus.wecc_renewable.converters import REGCA1, Kind
-from fmus.wecc_renewable.dyr_records import AT_A_UNIT, ELSEWHERE, PITCH_OF_TYPE_3, TYPE_3
+from fmus.wecc_renewable.dyr_records import (
+    AT_A_UNIT,
+    ELSEWHERE,
+    FIRST_GENERATION,
+    OF_FIRST_GENERATION,
+    PITCH_OF_TYPE_3,
+    TYPE_3,
+)
 from fmus.wecc_renewable.electrical import Reeca1
 from fmus.wecc_renewable.electrical_blocking import Reecd1
 from fmus.wecc_renewable.electrical_storage import Reecc1
-from fmus.wecc_renewable.model import Makeup, composed, type_3
+from fmus.wecc_renewable.model import Makeup, composed, type_3, type_4
 from fmus.wecc_renewable.turbine import TurbineParts
 
 CONVERTERS: dict[str, Kind] = {"REGCA1": REGCA1, "REGCB1": REGCB1, "REGCC1": REGCC1}
@@ -34,7 +41,7 @@ def wecc_plant_phasor(records: str = "REGCC1 REECD1") -> Model:
         PSS/E's names of its records, in any order: one of `CONVERTERS` and one of `CONTROLS`; REPCA1, with the word
         ``elsewhere`` if it measures at another point of the network, or one of `AT_A_UNIT`, if a component of
         `plant_controller_phasor` sets the references of several units; WTDTA1, and with it some of `ON_SHAFT`. Or those
-        of `TYPE_3`, the first generation, with WT3P1 or without.
+        of one turbine of `FIRST_GENERATION`.
 
     Raises
     ------
@@ -42,8 +49,8 @@ def wecc_plant_phasor(records: str = "REGCC1 REECD1") -> Model:
         If a name is none of these, a kind lacks, or there are two of one kind.
     """
     given = records.split()
-    if {*given} & {*TYPE_3, PITCH_OF_TYPE_3}:
-        return _type_3(records)
+    if {*given} & OF_FIRST_GENERATION:
+        return _of_first_generation(records)
     converter = _one_of("converter", CONVERTERS, given)
     control = _one_of("control", CONTROLS, given)
     known = {*CONVERTERS, *CONTROLS, PLANT, ELSEWHERE, *AT_A_UNIT, SHAFT, *ON_SHAFT}
@@ -73,17 +80,20 @@ def wecc_plant_phasor(records: str = "REGCC1 REECD1") -> Model:
     return replace(composed(name, f"{title} (phasor type)", makeup), of_parts=True)
 
 
-def _type_3(records: str) -> Model:
-    """The turbine of type 3 of the first generation."""
-    given, all_there = records.split(), {*TYPE_3, PITCH_OF_TYPE_3}
-    if not {*TYPE_3} <= {*given} <= all_there or len({*given}) < len(given):
+def _of_first_generation(records: str) -> Model:
+    """A turbine of the first generation."""
+    given = records.split()
+    needed, more = next(own for own in FIRST_GENERATION if {*given} & {*own[0], *own[1]})
+    if not {*needed} <= {*given} <= {*needed, *more} or len({*given}) < len(given):
+        beside = f", with {' or '.join(more)} or without," if more else ""
         raise ValueError(
-            f"records = {records!r}: {' '.join(TYPE_3)} go together, with {PITCH_OF_TYPE_3} or without, and nothing "
-            "else beside them"
+            f"records = {records!r}: {' '.join(needed)} go together{beside} and nothing else beside them"
         )
-    names = [name for name in (*TYPE_3, PITCH_OF_TYPE_3) if name in given]
+    names = [name for name in (*needed, *more) if name in given]
     name = "_".join(["wecc_plant", *(n.lower() for n in names), "phasor"])
     title = f"Wind turbine of {', '.join(names)} (phasor type)"
+    if needed != TYPE_3:
+        return replace(type_4(name, title), of_parts=True)
     return replace(type_3(name, title, has_pitch=PITCH_OF_TYPE_3 in names), of_parts=True)
 
 

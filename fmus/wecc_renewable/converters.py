@@ -47,6 +47,8 @@ class Kind(NamedTuple):
 class Regca1(Converter):
     """REGCA1: a current at the angle of the terminal voltage."""
 
+    _injection_of = staticmethod(declare_injection)
+
     def __init__(
         self, m: ModelBuilder, port: DevicePort, seen: ExtrapolatedVoltage, Z: Phasor
     ) -> None:
@@ -54,7 +56,7 @@ class Regca1(Converter):
         v_0 = port.v_0.magnitude()
         self._seen, self._Z = seen, Z
         self._at_start = s_0 / v_0
-        self._injection: Injection = declare_injection(
+        self._injection: Injection = self._injection_of(
             m, seen.value.magnitude(), v_0, s_0.re, s_0.im
         )
         self.active_0, self.reactive_0 = self._injection.active_0, self._injection.reactive_0

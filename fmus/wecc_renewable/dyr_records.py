@@ -43,3 +43,11 @@ TYPE_3 = ("WT3G1", "WT3E1", "WT3T1")
 
 PITCH_OF_TYPE_3 = "WT3P1"
 """Its pitch control, which may lack."""
+
+TYPE_4 = ("WT4G1", "WT4E1")
+"""Records of a turbine of type 4 of the first generation: converter and control."""
+
+FIRST_GENERATION = ((TYPE_3, (PITCH_OF_TYPE_3,)), (TYPE_4, ()))
+"""Turbines of the first generation: records that go together, and those that may lack."""
+
+OF_FIRST_GENERATION = frozenset({*TYPE_3, PITCH_OF_TYPE_3, *TYPE_4})

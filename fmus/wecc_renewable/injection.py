@@ -45,7 +45,7 @@ class Injection:
     reactive: Expr
     active_0: Expr
     reactive_0: Expr
-    lags: tuple["_Lag", "_Lag"]
+    lags: tuple["Lag", "Lag"]
 
     def follow(self, m: ModelBuilder, active: Expr, reactive: Expr) -> None:
         """Let both currents follow their commands [pu, S_n]."""
@@ -54,13 +54,16 @@ class Injection:
 
 
 @dataclass(frozen=True)
-class _Lag:
+class Lag:
+    """A current behind its lag, with the limits of its rate and of itself."""
+
     x: Expr
     T: Expr
     rates: tuple[Scalar, Scalar]
     high: Scalar = UNLIMITED
 
     def follow(self, m: ModelBuilder, u: Expr) -> None:
+        """Let the current follow its command [pu, S_n]."""
         limits = -UNLIMITED, self.high
         rate = clamp((u - reached(self.x, *limits)) / self.T, *self.rates)
         m.derivative(self.x, held_at_limits(self.x, rate, *limits))
@@ -78,7 +81,7 @@ def declare_injection(m: ModelBuilder, v: Expr, v_0: Expr, P_0: Scalar, Q_0: Sca
     reactive_0 = Q_0 / v_0 + p.Khv * fmax(v_0 - p.Volim, 0)
     seen = low_pass_or_nothing(m, "lvpl_voltage", v, p.Tfltr, v_0)
     allowed, allowed_0 = (
-        if_else(limits_power, _allowed(p.Zerox, p.Brkpt, p.Lvpl1, voltage), UNLIMITED)
+        if_else(limits_power, allowed_by_voltage(p.Zerox, p.Brkpt, p.Lvpl1, voltage), UNLIMITED)
         for voltage in (seen, v_0)
     )
     m.require(
@@ -96,12 +99,12 @@ def declare_injection(m: ModelBuilder, v: Expr, v_0: Expr, P_0: Scalar, Q_0: Sca
         active_0,
         reactive_0,
         (
-            _Lag(active, p.Tg, (-UNLIMITED, fmin(p.Rrpwr, UNLIMITED)), allowed),
-            _Lag(reactive, p.Tg, (falling, rising)),
+            Lag(active, p.Tg, (-UNLIMITED, fmin(p.Rrpwr, UNLIMITED)), allowed),
+            Lag(reactive, p.Tg, (falling, rising)),
         ),
     )
 
 
-def _allowed(zero: Expr, full: Expr, at_full: Expr, v: Expr) -> Expr:
+def allowed_by_voltage(zero: Expr, full: Expr, at_full: Expr, v: Expr) -> Expr:
     """The active current that LVPL leaves at a voltage [pu, S_n]; above ``full`` it limits nothing."""
     return if_else(v > full, UNLIMITED, through_points(v, ((zero, 0.0), (full, at_full))))

@@ -7,6 +7,7 @@ terminal voltage."""
 from dataclasses import dataclass
 
 from fmus.converter_parts.bus_voltage import ExtrapolatedVoltage, extrapolated_voltage
+from fmus.converter_parts.current_at_angle import port_of_current
 from fmus.toolchain.frames import power
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
@@ -27,6 +28,8 @@ from fmus.wecc_renewable.several_units import references_by_plant
 from fmus.wecc_renewable.signals import References, Terminal
 from fmus.wecc_renewable.turbine import Turbine, TurbineParts
 from fmus.wecc_renewable.type_3 import Wt3, Wt3g1, port_of_machine
+from fmus.wecc_renewable.type_4 import Wt4g1
+from fmus.wecc_renewable.type_4 import commands as commands_of_type_4
 
 S_N = 100.0  # default rating [MVA]: the base of networks
 P_0 = 0.8  # default power [pu, S_n]
@@ -138,6 +141,29 @@ def type_3(name: str, title: str, *, has_pitch: bool) -> Model:
     m.output("I_p_command", active, "pu", "Command of active current", base="S_n")
     m.output("E_q_command", emf, "pu", "Command of the emf", base="bus")
     turbine.declare_outputs(m)
+    return m.build()
+
+
+def type_4(name: str, title: str) -> Model:
+    """The turbine of WT4G1 and WT4E1."""
+    m = phasor_builder(name, title, kind="converter", usual=USUAL)
+    S_n = declare_rating(m, S_N)
+    port = device_port_of(m, S_n, P_0)
+    Z = port_of_current(m)
+    master = declare_master_step(m)
+    seen = extrapolated_voltage(m, port, master)
+    seen.follow(m, port.v)
+    converter = Wt4g1(m, port, seen, Z)
+    with m.scope("electrical"):
+        active, reactive = commands_of_type_4(m, _terminal(port, seen, converter), converter)
+    converter.follow(m, active, reactive)
+    declare_phasor_outputs(m, port, converter.emf(m, master), Z)
+    fed = converter.fed()
+    m.output("V", seen.value.magnitude(), "pu", "Voltage magnitude at the terminal", base="bus")
+    m.output("I_p_fed", fed[0], "pu", "Active current", base="S_n")
+    m.output("I_q_fed", fed[1], "pu", "Reactive current", base="S_n")
+    m.output("I_p_command", active, "pu", "Command of active current", base="S_n")
+    m.output("I_q_command", reactive, "pu", "Command of reactive current", base="S_n")
     return m.build()
 
 

@@ -28,6 +28,7 @@ from fmus.toolchain.blocks import (
     clamp,
     held_at_limits,
     low_pass_or_nothing,
+    reached,
 )
 from fmus.toolchain.frames import Phasor, polar
 from fmus.toolchain.frames import power as power_of
@@ -240,45 +241,16 @@ class Wt3:
     def _reactive(self, m: ModelBuilder) -> Expr:
         """The command of the emf [pu]."""
         p, t = self._p, self._t
-        P, Q = t.P, t.Q
-        by_voltage, by_angle = p.VARFLG > 0, p.VARFLG < 0
-        size = sqrt(P**2 + Q**2 + 1e-12) / fmax(t.size, LEAST_VOLTAGE)
+        size = sqrt(t.P**2 + t.Q**2 + 1e-12) / fmax(t.size, LEAST_VOLTAGE)
         size_0 = sqrt(t.P_0**2 + t.Q_0**2 + 1e-12) / t.size_0
-        seen_0 = t.size_0 - p.Xc * size_0
-        change = m.parameter(
-            "delta_ref",
-            0.0,
-            "pu",
-            "Change of the voltage's reference, or of the reactive power's where VARFLG is not 1",
-            base="S_n",
-            tunable=True,
-        )
-        seen = low_pass_or_nothing(m, "voltage", t.size - p.Xc * size, p.TRV, seen_0)
-        error = if_else(by_voltage, seen_0 + change - seen, 0)
-        straight = low_pass_or_nothing(m, "straight", p.KPV * error, p.Tv, 0.0)
-        slow = m.state("integral", self._Q_0, "pu", "Integral of the voltage", base="S_n")
-        free = slow + straight
-        outward = logic_or(logic_and(free > p.QMX, error > 0), logic_and(free < p.QMN, error < 0))
-        resting = (self._Q_0 - slow) / BYPASS_TIME
-        acts = logic_and(by_voltage, p.KIV > 0)
-        m.derivative(slow, if_else(acts, if_else(outward, 0, p.KIV * error), resting))
-        of_voltage = low_pass_or_nothing(m, "order", clamp(free, p.QMN, p.QMX), p.Tfv, self._Q_0)
-        measured = low_pass_or_nothing(m, "power", P, p.Tp, t.P_0)
-        of_angle = measured * self._Q_0 / if_else(by_angle, t.P_0, 1)
-        asked = if_else(by_voltage, of_voltage, if_else(by_angle, of_angle, self._Q_0) + change)
-        _within(m, self._Q_0, p, "QMN", "QMX")
-        _within(m, t.size_0, p, "VMINCL", "VMAXCL")
-        target = m.state("voltage_asked", t.size_0, "pu", "Reference of the voltage", base="bus")
-        rate = p.KQi * (clamp(asked, p.QMN, p.QMX) - Q)
-        limited = held_at_limits(target, rate, p.VMINCL, p.VMAXCL)
-        m.derivative(target, if_else(p.KQi > 0, limited, (t.size_0 - target) / BYPASS_TIME))
+        seen = t.size - p.Xc * size, t.size_0 - p.Xc * size_0
+        target = voltage_asked(m, t, p, seen, by_voltage=p.VARFLG > 0, by_angle=p.VARFLG < 0)
         start = self._converter.reactive_0
         base, base_0 = (if_else(p.VLTFLG < 1.5, v, 0) for v in (t.size, t.size_0))
-        _within(m, start - base_0, p, "XIQmin", "XIQmax")
+        within(m, start - base_0, p, "XIQmin", "XIQmax")
         emf = m.state("emf", start, "pu", "Integral of the voltage's error", base="bus")
         low, high = base + p.XIQmin, base + p.XIQmax
-        error = clamp(target, p.VMINCL, p.VMAXCL) - t.size
-        m.derivative(emf, held_at_limits(emf, p.KQV * error, low, high))
+        m.derivative(emf, held_at_limits(emf, p.KQV * (target - t.size), low, high))
         return clamp(emf, low, high)
 
     def _active(self, m: ModelBuilder) -> tuple[Expr, Expr]:
@@ -291,8 +263,9 @@ class Wt3:
         torque = m.state("torque", start, "pu", "Integral of the speed", base="rating")
         m.derivative(torque, if_else(p.KIP > 0, p.KIP * error, (start - torque) / BYPASS_TIME))
         order = m.state("P_ord", self._P_0, "pu", "Order of power", base="rating")
-        rate = clamp(((torque + p.Kpp * error) * self.speed - order) / p.TFP, p.RPMN, p.RPMX)
-        _within(m, self._P_0, p, "PMN", "PMX")
+        asked = (torque + p.Kpp * error) * self.speed
+        rate = clamp((asked - reached(order, p.PMN, p.PMX)) / p.TFP, p.RPMN, p.RPMX)
+        within(m, self._P_0, p, "PMN", "PMX")
         m.derivative(order, held_at_limits(order, rate, p.PMN, p.PMX))
         return clamp(order, p.PMN, p.PMX), reference
 
@@ -357,12 +330,55 @@ class Wt3:
         m.output("P_mechanical", self._mechanical, "pu", "Power of the wind", base="S_n")
 
 
+def voltage_asked(
+    m: ModelBuilder,
+    t: Terminal,
+    p: Given,
+    controlled: tuple[Expr, Expr],
+    *,
+    by_voltage: Expr,
+    by_angle: Expr,
+) -> Expr:
+    """The reference of the voltage [pu], by the controlled voltage, the power factor or the reactive power.
+
+    ``controlled``: voltage, and at the operating point."""
+    (seen, seen_0), Q_0 = controlled, Expr(t.Q_0)
+    change = m.parameter(
+        "delta_ref",
+        0.0,
+        "pu",
+        "Change of the voltage's reference, or of the reactive power's where VARFLG is not 1",
+        base="S_n",
+        tunable=True,
+    )
+    behind = low_pass_or_nothing(m, "voltage", seen, p.TRV, seen_0)
+    error = if_else(by_voltage, seen_0 + change - behind, 0)
+    straight = low_pass_or_nothing(m, "straight", p.KPV * error, p.Tv, 0.0)
+    slow = m.state("integral", Q_0, "pu", "Integral of the voltage", base="S_n")
+    free = slow + straight
+    outward = logic_or(logic_and(free > p.QMX, error > 0), logic_and(free < p.QMN, error < 0))
+    resting = (Q_0 - slow) / BYPASS_TIME
+    acts = logic_and(by_voltage, p.KIV > 0)
+    m.derivative(slow, if_else(acts, if_else(outward, 0, p.KIV * error), resting))
+    of_voltage = low_pass_or_nothing(m, "order", clamp(free, p.QMN, p.QMX), p.Tfv, Q_0)
+    measured = low_pass_or_nothing(m, "power", t.P, p.Tp, t.P_0)
+    of_angle = measured * Q_0 / if_else(by_angle, t.P_0, 1)
+    asked = if_else(by_voltage, of_voltage, if_else(by_angle, of_angle, Q_0) + change)
+    within(m, Q_0, p, "QMN", "QMX")
+    within(m, t.size_0, p, "VMINCL", "VMAXCL")
+    target = m.state("voltage_asked", t.size_0, "pu", "Reference of the voltage", base="bus")
+    rate = p.KQi * (clamp(asked, p.QMN, p.QMX) - t.Q)
+    limited = held_at_limits(target, rate, p.VMINCL, p.VMAXCL)
+    m.derivative(target, if_else(p.KQi > 0, limited, (t.size_0 - target) / BYPASS_TIME))
+    return clamp(target, p.VMINCL, p.VMAXCL)
+
+
 def _is_small(x: Expr) -> Expr:
     """Return whether a signal lies within `REST`."""
     return logic_and(x <= REST, x >= -REST)
 
 
-def _within(m: ModelBuilder, value: Expr, p: Given, low: str, high: str) -> None:
+def within(m: ModelBuilder, value: Expr, p: Given, low: str, high: str) -> None:
     """Require the operating point's value within two limits of the control."""
     for margin, name in ((getattr(p, high) - value, high), (value - getattr(p, low), low)):
         text = f"electrical.{name}: the power flow asks for more; change it, Prated, or the unit's powers"

@@ -81,6 +81,7 @@ MODELS = {
             "REGCA1 REECA1 WTDTA1 WTARA1 WTPTA1 WTTQA1",
             "REGCB1 REECC1 REAX4BU1",
             "WT3G1 WT3E1 WT3T1 WT3P1",
+            "WT4G1 WT4E1",
         )
     },
     **{f"exciter {name}": partial(exciter, name) for name in EXCITERS},

@@ -315,7 +315,8 @@ def test_a_record_has_the_fields_of_the_program():
     turbine = {"WTDTA1": 5, "WTARA1": 2, "WTPTA1": 10, "WTTQA1": 1 + 15}
     at_a_unit = {"REAX3BU1": 1 + 7, "REAX4BU1": 1 + 7}
     of_type_3 = {"WT3G1": 1 + 5, "WT3E1": 6 + 31, "WT3T1": 8, "WT3P1": 9}
-    numbers = first | others | turbine | at_a_unit | of_type_3
+    of_type_4 = {"WT4G1": 9, "WT4E1": 4 + 23}
+    numbers = first | others | turbine | at_a_unit | of_type_3 | of_type_4
     assert {name: len(record.fields) for name, record in PLANT_RECORDS.items()} == numbers
     known = {v.name for v in regca1_repca1_phasor().parameters}
     elsewhere = {v.name for v in regca1_repca1_remote_phasor().parameters}

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
 from fmus.grid_following.dyr_approximation import FIELDS, MODEL
-from fmus.wecc_renewable.dyr_records import PITCH_OF_TYPE_3, PLANT_RECORDS, TYPE_3
+from fmus.wecc_renewable.dyr_records import FIRST_GENERATION, OF_FIRST_GENERATION, PLANT_RECORDS
 from orchestrator.cases.form.remedies import (
     APPROXIMATING,
     replacement_of,
@@ -56,8 +56,8 @@ def records_unfit(
     for (bus, name), own in parts.items():
         if (bus, name) not in replaced:
             machine, unit = f"machine {name!r} at bus {bus}", labels[bus, name]
-            of_type_3 = [*_of_type_3(machine, {*names[bus, name].values()}, unit)]
-            yield from of_type_3 or _incomplete(machine, own, unit)
+            of_first = [*_of_first_generation(machine, {*names[bus, name].values()}, unit)]
+            yield from of_first or _incomplete(machine, own, unit)
         others = ", ".join(kind for kind in own if kind not in KINDS_OF_CONVERTERS)
         if "converter" in own and others:
             yield f"machine {name!r} at bus {bus} is a converter, and has records of its {others}; remove them"
@@ -132,20 +132,23 @@ def _incomplete(machine: str, own: Mapping[str, str], unit: str) -> Iterator[str
 
 def _second_generation() -> list[str]:
     """Records of plants that are of no turbine of the first generation."""
-    return [name for name in PLANT_RECORDS if name not in (*TYPE_3, PITCH_OF_TYPE_3)]
+    return [name for name in PLANT_RECORDS if name not in OF_FIRST_GENERATION]
 
 
-def _of_type_3(machine: str, names: Collection[str], unit: str) -> Iterator[str]:
-    """Yield what is wrong with the records of a turbine of type 3 of the first generation."""
-    own = {*names} & {*TYPE_3, PITCH_OF_TYPE_3}
-    others = ({*names} & {*PLANT_RECORDS}) - own
-    if own and (others or not {*TYPE_3} <= own):
-        *first, last = TYPE_3
-        yield (
-            f"{machine} has records {', '.join(sorted(own | others))}: {', '.join(first)} and {last} go together, with "
-            f"{PITCH_OF_TYPE_3} or without it, and with no other record of a plant; correct them, or write "
-            f"{replacement_of(unit)}, and a converter of ours stands there"
-        )
+def _of_first_generation(machine: str, names: Collection[str], unit: str) -> Iterator[str]:
+    """Yield what is wrong with the records of a turbine of the first generation."""
+    for needed, more in FIRST_GENERATION:
+        own = {*names} & {*needed, *more}
+        others = ({*names} & {*PLANT_RECORDS}) - own
+        if own and (others or not {*needed} <= own):
+            *first, last = needed
+            beside = f", with {' or '.join(more)} or without it," if more else ""
+            yield (
+                f"{machine} has records {', '.join(sorted(own | others))}: {', '.join(first)} and {last} go together"
+                f"{beside} and with no other record of a plant; correct them, or write {replacement_of(unit)}, and a "
+                "converter of ours stands there"
+            )
+            return
 
 
 def going_with_shafts(

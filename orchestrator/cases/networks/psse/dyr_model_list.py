@@ -19,9 +19,9 @@ from fmus.toolchain.dyr_form import DyrRecord
 from fmus.wecc_renewable.dyr_records import (
     CONTROLLER,
     CONTROLLER_RECORD,
-    PITCH_OF_TYPE_3,
+    OF_FIRST_GENERATION,
     PLANT_RECORDS,
-    TYPE_3,
+    TYPE_4,
 )
 from orchestrator.cases.networks.psse.air_conditioners import AIR_CONDITIONERS
 from orchestrator.cases.networks.psse.composite_loads import COMPOSITE_NAMES
@@ -66,7 +66,8 @@ _MOTORS = "PowerWorld's guide to PSS/E's load models, and STEPS' reader"
 _GENERIC = (
     "WECC's generic converters: fields as ANDES and GridPACK read them, diagrams of WECC's guide"
 )
-_OF_TYPE_3 = "WECC's first generic turbine of type 3: fields and diagrams as InterPSS has them"
+_FIRST = "WECC's first generic turbines: fields and diagrams as InterPSS has them"
+_OF_TYPE_4 = f"{_FIRST}, diagrams as OPAL-RT shows them"
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +132,8 @@ def _of_machines() -> Iterator[KnownRecord]:
 
 def _of_plants() -> Iterator[KnownRecord]:
     for name, record in PLANT_RECORDS.items():
-        source = _OF_TYPE_3 if name in (*TYPE_3, PITCH_OF_TYPE_3) else _GENERIC
+        first = _OF_TYPE_4 if name in TYPE_4 else _FIRST
+        source = first if name in OF_FIRST_GENERATION else _GENERIC
         yield KnownRecord(name, _KINDS[record.kind], record.part, source, _of_plant(name))
 
 

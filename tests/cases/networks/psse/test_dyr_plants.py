@@ -241,7 +241,13 @@ TYPE_3 = (
     "3 'WT3T1' 1 1.0 4.94 0 0.007 21.98 0.875 1.8 1.5 /\n",
     "3 'WT3P1' 1 0.3 150 25 3 30 0 27 10 1 /\n",
 )
+TYPE_4 = (
+    "3 'WT4G1' 1 0.02 0.02 0.4 0.9 1.11 1.2 2 2 0.02 /\n",
+    "3 'WT4E1' 1 0 0 1 0 0.15 18 5 0.05 0.15 0 0.08 0.48 -0.47 1.1 0.1 0.5 -0.5 0.05 0.15 0.9 1.1 120 0.05 0.05 1.7 "
+    "1.11 1.11 /\n",
+)
 MADE = {
+    "WT4G1 WT4E1": TYPE_4,
     "WT3G1 WT3E1 WT3T1 WT3P1": TYPE_3,
     "REGCB1 REECC1": (line("REGCB1", EMF), line("REECC1", BATTERY)),
     "REGCC1 REECD1 REPCA1": (
@@ -275,6 +281,12 @@ def test_other_records_are_one_plant(records, prepared):
     if "WT3G1" in records:
         assert (given["turbines"], given["Xeq"], given["electrical.wP100"]) == (74, 0.8, 1.2)
         assert (given["shaft.Htfrac"], given["pitch.PMX"]) == (0.875, 1)
+    if "WT4G1" in records:
+        assert (given["GLVPL"], given["electrical.VARFLG"], given["electrical.Iqhl"]) == (
+            1.11,
+            1,
+            1.11,
+        )
     if "WTTQA1" in records:
         assert (given["torque.P3"], given["shaft.Freq1"]) == (0.6, 1.6)
 
@@ -363,6 +375,7 @@ def test_the_system_with_such_a_plant_has_modes_and_a_run(records, prepared, tmp
         ),
         ((*TYPE_3[:2], TYPE_3[3]), r"has records WT3E1, WT3G1, WT3P1: WT3G1, WT3E1 and WT3T1 go"),
         ((*TYPE_3, PLANT.format("1")), r"has records REPCA1, WT3E1, WT3G1, WT3P1, WT3T1: WT3G1"),
+        (TYPE_4[1:], r"has records WT4E1: WT4G1 and WT4E1 go together and with no other"),
         ((line("REGCC1", LOOP),), r"records of its converter and no REECA1, REECB1, REECC1 or"),
     ],
 )
