@@ -193,7 +193,7 @@ GALLERY = {
     ),
     "second machine of another model": Broken("remove one, or write", NINE, f"{DYR}{GENROU}\n"),
     "converter that is not known": Broken(
-        "a grid-following converter", NINE, changed(DYR, (GENCLS, "3 'WT4G1' 1 0 /"))
+        "a grid-following converter", NINE, changed(DYR, (GENCLS, "3 'WT4G2' 1 0 /"))
     ),
     "converter that no approximation fits": Broken(
         "cannot be approximated", NINE, following(QFLAG=1, VFLAG=1), "--dyr-approximate"

@@ -103,8 +103,8 @@ def test_every_field_sets_a_parameter_of_the_model(name, count):
         ),
         (
             "'REGFMA1'",
-            "'WT4G1'",
-            r"stands for WT4G1, a grid-following converter; write replace = ",
+            "'WT4G2'",
+            r"stands for WT4G2, a grid-following converter; write replace = ",
         ),
         (
             "'REGFMA1'",

@@ -107,9 +107,9 @@ def test_voltage_control_is_an_integrator(prepared):
     ("text", "units", "words"),
     [
         (
-            dyr("REECA1").replace("'REECA1'", "'WT4E1'"),
+            dyr("REECA1").replace("'REECA1'", "'WT4E2'"),
             "",
-            r"line 6: no part of ours stands for WT4E1, a grid-following converter; write replace = ",
+            r"line 6: no part of ours stands for WT4E2, a grid-following converter; write replace = ",
         ),
         (
             dyr(QFLAG=1, VFLAG=1),
