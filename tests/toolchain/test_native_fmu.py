@@ -3,6 +3,7 @@
 import math
 import re
 import zipfile
+from dataclasses import replace
 
 import fmpy
 import numpy as np
@@ -52,9 +53,9 @@ def test_a_wrong_guid_gives_no_instance_and_says_why(extracted):
     with LoadedComponent("good", description) as component:
         assert component.get(["S_n"]) == {"S_n": 1500.0}
     # a part of the right one passes our own check
-    object.__setattr__(description, "guid", description.guid[:-3])
+    wrong = replace(description, guid=description.guid[:-3])
     with pytest.raises(ComponentError, match=r"the guid \S+ is not this FMU's, which is \{"):
-        LoadedComponent("wrong", description)
+        LoadedComponent("wrong", wrong)
 
 
 # -- the same answers --------------------------------------------------------------------------
