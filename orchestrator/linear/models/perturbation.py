@@ -4,7 +4,7 @@ A limit or a dead band close to the operating point answers one size otherwise t
 downwards (`limits_close_by`)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -63,9 +63,12 @@ def perturb(step: PerturbedStep, rates: Sequence[str], *, once: bool = False) ->
         answers = _answers(step, again, columns, size)
         one_sided.take_back(columns, answers)
         disagree = answers.disagree
+        better = ~disagree
+        if size == PERTURBATIONS[-1]:
+            better &= _is_another(step, answers, found[0], columns)
         for kept, new in zip(found, again, strict=True):
-            _take_over(kept, new, columns, ~disagree, one_sided.now)
-        narrow |= {names[k]: size for k in _those_of(columns, ~disagree)}
+            _take_over(kept, new, columns, better, one_sided.now)
+        narrow |= {names[k]: size for k in _those_of(columns, better)}
         columns = _those_of(columns, disagree)
     doubtful = tuple(name for k, name in enumerate(names) if k in columns or one_sided.now[k])
     return PerturbationResult(*found, usual, narrow, doubtful)
@@ -120,6 +123,17 @@ def _answers(
         upwards=(small.after_up - at_rest, small.outputs_up),
         floors=(floor * step.step_size, floor),
     )
+
+
+def _is_another(
+    step: PerturbedStep, smallest: AnswersOfSize, usual: Differences, columns: Sequence[int]
+) -> Columns:
+    """Return the columns of which the smallest size tells another answer than the usual one, rounding apart.
+
+    Elsewhere the two usual sizes differ by rounding that a large gain multiplies, and the smallest has more of it."""
+    at_rest = np.eye(len(step.states), len(step.names))[:, columns]
+    before = (usual.after[:, columns] - at_rest, usual.outputs[:, columns])
+    return replace(smallest, twice=before).disagree
 
 
 def _those_of(columns: Sequence[int], chosen: Columns) -> list[int]:

@@ -1,12 +1,17 @@
 """The composed step map against brute force, and the FMUs' own derivatives against exact Jacobians."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from orchestrator.linear.models.component_linearization import linearize_component
 from orchestrator.linear.models.coupled_state import CoupledState
+from orchestrator.linear.models.differences import Differences
+from orchestrator.linear.models.limits_close_by import AnswersOfSize
 from orchestrator.linear.models.linear_model import HELD
 from orchestrator.linear.models.linearization import Blocks, compose, continuous
+from orchestrator.linear.models.perturbation import _is_another
 from orchestrator.linear.spectra.modes import eigenvalues
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.schedule import gauss_seidel, jacobi
@@ -148,3 +153,19 @@ def test_a_perturbation_is_as_large_as_its_value_needs(value):
     assert found.B.item() == pytest.approx(1 - left, abs=1e-9)
     assert found.C_o.item() == pytest.approx(1.0, abs=1e-9)
     assert found.disagreement < 1e-9
+
+
+@pytest.mark.parametrize(("usual", "is_another"), [(3.6e-5, False), (0.4, True)])
+def test_the_smallest_size_is_taken_where_it_tells_another_answer_and_not_for_rounding(
+    usual, is_another
+):
+    """A reference that moves the speed by rounding alone, which a stabiliser multiplies by 1e4; and a limit."""
+    step = SimpleNamespace(states=("x", "y"), names=("x", "y"))
+    nothing = np.array([[1.0], [0.0]]), np.zeros((0, 1))
+    floors = 10 * 2e-3, 10.0  # of 1e-8, with a step of 2 ms
+    at_rest = np.eye(2)[:, :1]
+    change = (nothing[0] - at_rest, nothing[1])
+    smallest = AnswersOfSize(change, change, change, floors)
+    after = np.array([[1.0, 0.0], [usual, 1.0]])
+    wide = Differences(after, np.zeros((0, 2)), *[np.zeros((0, 2))] * 4)
+    assert _is_another(step, smallest, wide, [0]).tolist() == [is_another]
