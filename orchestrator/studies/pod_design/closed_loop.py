@@ -20,9 +20,15 @@ from orchestrator.linear.models.component_linearization import ComponentLineariz
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.linearization import Blocks, compose, continuous, where_given
 from orchestrator.linear.spectra.continuation import Eigenpair, follow_along
-from orchestrator.linear.spectra.modes import Mode, Spectrum, damping_ratio
+from orchestrator.linear.spectra.modes import (
+    ELECTROMECHANICAL_HZ,
+    Mode,
+    Spectrum,
+    damping_ratio,
+    find_spectrum,
+)
 from orchestrator.linear.spectra.slowest_decay import decay_of
-from orchestrator.linear.spectra.stability import spectrum_of
+from orchestrator.linear.spectra.stability import WHOLE, spectrum_of
 from orchestrator.studies.pod_design.lead_lag import NO_COMPENSATION, LeadLag
 from orchestrator.studies.pod_design.stages import GAIN_ALONE, NEEDED
 from orchestrator.studies.points.key import key_of
@@ -138,9 +144,18 @@ class PodLoop:
         self._blocks = Blocks(master)
         self._off = compose(self._blocks, master.schedule)
         self._latest: tuple[PodSetting, LinearModel] | None = (off, self._off)
+        self._latest_spectrum: tuple[LinearModel, Spectrum] | None = None
 
     def model(self, setting: PodSetting) -> LinearModel:
         return self._off if setting.gain == 0 else self._model(setting)
+
+    def spectrum(self, setting: PodSetting) -> Spectrum:
+        """All eigenvalues of the step map with this setting, and the modes from 0.1 to 2 Hz; computed once where they
+        are asked for in a row."""
+        model = self.model(setting)
+        if self._latest_spectrum is None or self._latest_spectrum[0] is not model:
+            self._latest_spectrum = model, find_spectrum(model, *ELECTROMECHANICAL_HZ)
+        return self._latest_spectrum[1]
 
     def block(self, name: str) -> ComponentLinearization:
         return self._blocks.components[name]
@@ -155,15 +170,19 @@ class PodLoop:
     ) -> Examination:
         """The verdict on the whole system with this setting, at any frequency, with its warnings.
 
-        ``values``: all eigenvalues of a large system's step map with this setting [rad/s], where they are known; that
-        the continuous system decays is then proved without all of its own.
+        ``values``: all eigenvalues of a large system's step map with this setting [rad/s], where they are known.
         ``modes``: the modes that must not depend on the perturbation, where they are known.
-        ``spectrum``: all eigenvalues of the step map with the modes of the range, where both are known."""
+        ``spectrum``: all eigenvalues of the step map with the modes of the range, where both are known.
+
+        That a large continuous system decays is proved from its step map's eigenvalues, without all of its own."""
         system = where_given(lambda: self._continuous_model(setting))
         model = self._model(setting)
         if values is not None:
             spectrum = spectrum_of(model, values)
-        decay = None if values is None or system is None else decay_of(system, values)
+        elif spectrum is None and modes is None and len(model.names) <= WHOLE:
+            spectrum = self.spectrum(setting)
+        known = None if spectrum is None else spectrum.eigenvalues
+        decay = None if known is None or system is None else decay_of(system, known)
         return examine(
             self._master,
             self._blocks,

@@ -15,6 +15,7 @@ from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.asked import DAMPING, FLAG, GAIN, GAIN_BOUNDS, NAME, STAGES, request_field
 from orchestrator.core.errors import AnalysisError, InputError
 from orchestrator.core.options import Option
+from orchestrator.core.threads import one_thread
 from orchestrator.linear.doubts.examination import Examination
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.steady_state import find_operating_point
@@ -304,7 +305,8 @@ def design_pod(
         check_range(
             prepared.system.components, target.components, f"{request.controller}.K", value, option
         )
-    with running(prepared) as master:
+    # no last digit depends on the number of threads, and two would wait for each other on many small matrices
+    with one_thread(), running(prepared) as master:
         report("operating point")
         point = find_operating_point(master)
         loop = PodLoop(
@@ -320,7 +322,7 @@ def design_pod(
         examined = replace(examined, warnings=(*said, *examined.warnings))
         with _with_stability(examined.stability):
             model = loop.model(_OFF)
-            before = surroundings(model, None, naming)
+            before = surroundings(model, loop.spectrum(_OFF), None, naming)
             modes = [mode for mode in before.others if mode.is_oscillation]
             if name == CRITICAL:
                 rules = replace(case, table=naming_critical(case.table, modes))
@@ -477,8 +479,8 @@ class _Judge:
 
     def around(self, placed: Placed) -> Surroundings:
         """The other modes of the closed loop with a setting."""
-        model = self.loop.model(placed.setting)
-        return surroundings(model, placed.eigenvalue, self.start.naming)
+        model, spectrum = self.loop.model(placed.setting), self.loop.spectrum(placed.setting)
+        return surroundings(model, spectrum, placed.eigenvalue, self.start.naming)
 
     def breach_in(self, after: Surroundings) -> str | None:
         return breach(self.start.before, after, self.start.request.least_damping)

@@ -12,8 +12,8 @@ from orchestrator.linear.spectra.continuation import pair_of
 from orchestrator.linear.spectra.modes import (
     ELECTROMECHANICAL_HZ,
     Mode,
+    Spectrum,
     damping_ratio,
-    find_spectrum,
     to_continuous,
 )
 from orchestrator.linear.spectra.stability import fastest_growth
@@ -67,9 +67,12 @@ class Surroundings:
         return min(rest, key=lambda m: m.damping_ratio, default=None)
 
 
-def surroundings(model: LinearModel, target: complex | None, naming: Naming) -> Surroundings:
-    """All modes except the one at ``target`` [rad/s]; ``naming`` finds the mode with the target's name."""
-    spectrum = find_spectrum(model, *ELECTROMECHANICAL_HZ)
+def surroundings(
+    model: LinearModel, spectrum: Spectrum, target: complex | None, naming: Naming
+) -> Surroundings:
+    """All modes from 0.1 to 2 Hz of a model's spectrum, except the one at ``target`` [rad/s].
+
+    ``naming``: finds the mode with the target's name."""
     others, followed = tuple(spectrum.modes), None
     if target is not None:
         others = tuple(m for m in others if abs(m.eigenvalue - target) > _SAME * abs(target))

@@ -11,14 +11,15 @@ from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 
-from orchestrator.core.arrays import Matrix, Vector
+from orchestrator.core.arrays import Complex, Matrix, Vector
 from orchestrator.core.errors import AnalysisError
 from orchestrator.core.late import optimize
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.modes import ZERO, damping_ratio
 from orchestrator.studies.pod_design.closed_loop import Placed, PodLoop, PodSetting
-from orchestrator.studies.pod_design.guard import extremes
+from orchestrator.studies.pod_design.guard import extremes, weakest_and_growing
 from orchestrator.studies.pod_design.lead_lag import LeadLag
+from orchestrator.studies.pod_design.one_form import OneForm
 from orchestrator.studies.points.store import Arrays
 
 _FREQUENCIES = (0.01, 500.0)  # range of frequencies in which the loop is examined [Hz]
@@ -122,6 +123,8 @@ def _crossings(around: _Loop, grid: Vector, values: Vector) -> Iterator[tuple[fl
 _STRIDE = 2**0.5  # factor between two gains that are tried
 _REACH = 8.0  # gains from 1/8 to 8 times the designed one are tried
 _HALVINGS = 4  # of the step in which a mode is lost: the edge is known to 3 %
+# eigenvalues and damping ratios that differ by less, as a part, are one, computed in two ways
+_SAME = 1e-6
 VARIATION = 0.2  # relative change of K, T_S1 and T_S2, one at a time
 LARGER_GAIN = f"K {100 * VARIATION:+.0f} %"
 
@@ -154,16 +157,17 @@ def compute_margins(
     ``off``, ``nominal``: the target without the POD and with the designed setting.
     ``least``: damping ratio that every mode should keep; a design that does not reach it keeps its own.
     ``report``: is told what is computed."""
-    weakest, fastest = _extremes(loop, nominal.setting)
+    modes = _ExtremeModes(loop, nominal.setting)
+    weakest, fastest = modes.at(nominal.setting)
     limit, growth = min(least, damping_ratio(weakest)), fastest.real if fastest else 0.0
 
     def lost(factor: float) -> complex | None:
         report(f"margins: all modes with {factor:.3g} times the gain")
         setting = replace(nominal.setting, gain=nominal.setting.gain * factor)
-        weakest, fastest = _extremes(loop, setting)
+        weakest, fastest = modes.at(setting)
         if fastest and fastest.real > growth:
             return fastest
-        return weakest if damping_ratio(weakest) < limit - 1e-9 else None
+        return weakest if damping_ratio(weakest) < limit - _SAME else None
 
     (up, lost_up), (down, lost_down) = (_edge(lost, stride) for stride in (_STRIDE, 1 / _STRIDE))
     report("margins: phase and delay")
@@ -182,16 +186,49 @@ def compute_margins(
     )
 
 
-def _extremes(loop: PodLoop, setting: PodSetting) -> tuple[complex, complex | None]:
-    def computed() -> Arrays:
-        weakest, fastest = extremes(loop.model(setting))
-        return {
-            "weakest": np.array(weakest),
-            "fastest": np.array([] if fastest is None else [fastest], dtype=complex),
-        }
+class _ExtremeModes:
+    """The least damped mode from 0.1 to 2 Hz and the fastest growing one, by setting.
 
-    found = loop.figures("extremes", {"setting": astuple(setting)}, computed)
-    return complex(found["weakest"]), next(iter(found["fastest"].tolist()), None)
+    In a large system one Schur form gives those of all settings, if it gives those of the nominal one."""
+
+    def __init__(self, loop: PodLoop, nominal: PodSetting) -> None:
+        self._loop, self._nominal = loop, nominal
+        self._form, self._is_proved = OneForm(loop), False
+
+    def at(self, setting: PodSetting) -> tuple[complex, complex | None]:
+        def computed() -> Arrays:
+            weakest, fastest = self._by_form(setting) or extremes(self._loop.model(setting))
+            return {
+                "weakest": np.array(weakest),
+                "fastest": np.array([] if fastest is None else [fastest], dtype=complex),
+            }
+
+        found = self._loop.figures("extremes", {"setting": astuple(setting)}, computed)
+        return complex(found["weakest"]), next(iter(found["fastest"].tolist()), None)
+
+    def _by_form(self, setting: PodSetting) -> tuple[complex, complex | None] | None:
+        found = self._form.at(setting)
+        if found is None:
+            return None
+        if not self._is_proved:
+            whole = self._loop.spectrum(self._nominal).eigenvalues
+            nominal = self._form.at(self._nominal)
+            if nominal is None or not _are_alike(self._of(nominal.values), self._of(whole)):
+                self._form.fail()
+                return None
+            self._is_proved = True
+        return self._of(found.values)
+
+    def _of(self, values: Complex) -> tuple[complex, complex | None]:
+        is_map = self._loop.model(self._nominal).step_size is not None
+        return weakest_and_growing(values, step_map=is_map)
+
+
+def _are_alike(one: tuple[complex, complex | None], other: tuple[complex, complex | None]) -> bool:
+    return all(
+        a == b or (a is not None and b is not None and abs(a - b) <= _SAME * abs(b))
+        for a, b in zip(one, other, strict=True)
+    )
 
 
 def _margins_of_loop(loop: PodLoop, setting: PodSetting) -> tuple[LoopMargins | None, str]:

@@ -7,6 +7,7 @@ import scipy.linalg
 
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.continuation import Eigenpair
+from orchestrator.linear.spectra.modes import find_spectrum
 from orchestrator.studies.pod_design.closed_loop import Placed, PodSetting
 from orchestrator.studies.pod_design.lead_lag import LeadLag
 
@@ -39,6 +40,9 @@ class Plant:
         blocks = [[[z.real, z.imag], [-z.imag, z.real]] for z in self.eigenvalues(setting)]
         A = scipy.linalg.block_diag(*blocks)
         return LinearModel.from_matrix(A, tuple(f"x{k}" for k in range(len(A))), None)
+
+    def spectrum(self, setting):
+        return find_spectrum(self.model(setting))
 
     def continuous_models(self, setting):
         return self.model(PodSetting(setting.gain / 2, setting.filters)), self.model(setting)

@@ -8,7 +8,10 @@ import pytest
 from orchestrator.core.errors import AnalysisError
 from orchestrator.linear.models.linearization import Blocks
 from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.linear.spectra import slowest_decay, stability
+from orchestrator.linear.spectra.modes import find_spectrum
 from orchestrator.studies.modes.modes import running
+from orchestrator.studies.pod_design import closed_loop
 from orchestrator.studies.pod_design.closed_loop import PodLoop, PodSetting
 from orchestrator.studies.pod_design.lead_lag import LeadLag
 from tests.support.scenarios import prepare_one
@@ -70,3 +73,23 @@ def test_after_an_error_the_blocks_are_not_taken_for_those_of_the_setting_before
         before = len(renewed)
         np.testing.assert_array_equal(loop.model(ON).A, right)
         assert len(renewed) == before + 1
+
+
+def test_one_spectrum_of_a_large_system_serves_its_verdict_and_its_modes(monkeypatch):
+    """That the system without a communication step decays is proved without another spectrum."""
+    computed = []
+
+    def counted(model, *within):
+        computed.append(model)
+        return find_spectrum(model, *within)
+
+    monkeypatch.setattr(closed_loop, "find_spectrum", counted)
+    with pod_loop() as loop:
+        by_both = loop.examine(ON).stability
+        monkeypatch.setattr(slowest_decay, "LEAST_STATES", 0)
+        monkeypatch.setattr(stability, "whole_spectrum", None)
+        proved = loop.examine(ON).stability
+        assert proved.stable is by_both.stable is True
+        assert proved.continuous_growth_rate == pytest.approx(by_both.continuous_growth_rate)
+        assert loop.spectrum(ON).rightmost.eigenvalue == proved.mode.eigenvalue
+    assert len(computed) == 1

@@ -1,9 +1,12 @@
 """Margins of a setting's gain, on a plant whose modes are lost at gains that a formula gives."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 
+from orchestrator.studies.pod_design import margins as module
+from orchestrator.studies.pod_design import one_form
 from orchestrator.studies.pod_design.design import PodDesign
 from orchestrator.studies.pod_design.margins import compute_margins
 from tests.studies.pod_design.plant import Plant, gain_for
@@ -29,6 +32,26 @@ def test_the_gain_may_rise_until_another_mode_is_lost():
     assert (found.down, found.lost_down) == (None, None), (
         "without the controller all modes are there"
     )
+
+
+@pytest.mark.parametrize(("contradicted", "whole"), [(0.0, 1), (0.01, 14)])
+def test_one_schur_form_gives_the_same_margins(monkeypatch, contradicted, whole):
+    """All eigenvalues are computed with the controller off, and with each gain where the form is found to be wrong."""
+    expected, computed, extremes = margins(WORSE, 20.0, 0.03), [], module.extremes
+    plant = replace(WORSE)
+    spectrum = plant.spectrum
+
+    def other(setting):
+        found = spectrum(setting)
+        return replace(found, eigenvalues=found.eigenvalues - contradicted)
+
+    monkeypatch.setattr(plant, "spectrum", other)
+    monkeypatch.setattr(one_form, "LEAST_CHANGED", 0)
+    monkeypatch.setattr(module, "extremes", lambda model: computed.append(model) or extremes(model))
+    found = margins(plant, 20.0, 0.03)
+    assert len(computed) == whole
+    assert (found.up, found.down) == (expected.up, expected.down)
+    assert found.lost_up == pytest.approx(expected.lost_up)
 
 
 def test_a_mode_that_is_below_the_limit_already_lowers_it():

@@ -11,6 +11,7 @@ from orchestrator.linear.spectra import followed_swings
 from orchestrator.linear.spectra.changed_spectra import ChangedSpectra
 from orchestrator.linear.spectra.continuation import pair_at
 from orchestrator.linear.spectra.mode_refinement import RefinedModes
+from orchestrator.studies.pod_design import one_form
 from orchestrator.studies.pod_design.closed_loop import Placed, PodSetting
 from orchestrator.studies.pod_design.lead_lag import NO_COMPENSATION
 from orchestrator.studies.siting import confirmation, least_damping
@@ -141,7 +142,7 @@ def test_one_schur_form_leads_to_the_same_with_one_whole_spectrum(monkeypatch, s
     loop = LargeLoop(other)
     expected = tuned(loop)
     spectra.clear()
-    monkeypatch.setattr(least_damping, "LEAST_CHANGED", 0)
+    monkeypatch.setattr(one_form, "LEAST_CHANGED", 0)
     setting, end = tuned(loop)
     assert setting == expected[0]
     assert end.next_gain == expected[1].next_gain
@@ -158,7 +159,7 @@ def test_a_form_that_the_whole_spectrum_contradicts_is_given_up(monkeypatch, spe
     wrong = replace(expected[0], gain=12.5)
     assert expected[0] != wrong
     spectra.clear()
-    monkeypatch.setattr(least_damping, "LEAST_CHANGED", 0)
+    monkeypatch.setattr(one_form, "LEAST_CHANGED", 0)
     whole = ChangedSpectra.of
 
     def planted(self, model):
