@@ -55,14 +55,19 @@ def measure(
         acts, sees = _loop(master, place, before)
         U[windows[name], k], sent[:p][blocks.window[name], k] = acts[:n], acts[n:]
         V[k, windows[name]], seen[k, blocks.entries(name, newest, arriving)] = sees[:n], sees[n:]
-    if not (sent.any() or seen.any()):
-        return OpenLoops.of(model.A, U, V, there, model.names)
-    # What a loop gives to the outputs comes back by way of the network: ż = F·z + G·w + U·s, w = H·z + K·w + sent·s.
-    travelled = model.settle(sent)
-    through = model.settle(model.H.toarray())
-    return OpenLoops.of(
-        model.A, U + model.G @ travelled, V + seen @ through, there, model.names, seen @ travelled
-    )
+    D = None
+    if sent.any() or seen.any():
+        # What a loop gives to the outputs comes back by way of the network: ż = F·z + G·w + U·s, w = H·z + K·w +
+        # sent·s.
+        travelled = model.settle(sent)
+        through = model.settle(model.H.toarray())
+        U, V, D = U + model.G @ travelled, V + seen @ through, seen @ travelled
+
+    def answer(s: complex) -> Vector:
+        solve = model.shifted(s).solve_exactly
+        return np.asarray(-V @ np.column_stack([solve(column) for column in U.T + 0j]))
+
+    return OpenLoops.of(model.A, U, V, there, model.names, D, answer)
 
 
 def _loop(master: Master, place: PodPlace, before: ComponentLinearization) -> tuple[Vector, Vector]:

@@ -128,9 +128,39 @@ def test_the_direct_term_of_a_reduced_system_has_the_right_sign(monkeypatch):
     assert abs(found["reduced"] - found["whole"]) < 0.1 * wrong
 
 
+def test_what_many_modes_give_to_a_loop_stays_in_a_reduced_system(monkeypatch):
+    """Each of sixty modes is moved by a hundredth of its size, and all of them together by another swing's damping."""
+    swing = 2 * np.pi * 0.7 * np.array([[-0.07, 1.0], [-1.0, -0.07]])
+    rates, few = np.linspace(1.0, 20.0, 60), np.linspace(25.0, 30.0, 8)
+    A = scipy.linalg.block_diag(swing, np.diag(-rates), np.diag(-few))
+    U = np.concatenate([[0.05, 0.05], np.sqrt(0.01 * rates / 400), np.full(8, 1e-6)])[:, None]
+    names = tuple(f"x{k}" for k in range(len(A)))
+    setting = {PLACE: PodSetting(400.0, lead_lag_turning(80.0, 4.4, 2))}
+    expected = OpenLoops.of(A, U, U.T, [PLACE], names).eigenvalues(setting)
+    target = min(expected, key=lambda z: abs(z - 4.4j))
+    monkeypatch.setattr(open_loops, "REDUCED", 5)
+    reduced = OpenLoops.of(A, U, U.T, [PLACE], names)
+    assert len(reduced.A) == 62
+    assert np.abs(reduced.eigenvalues(setting) - target).min() < 1e-6 * abs(target)
+    monkeypatch.setattr(open_loops, "_FELT", 0.02)
+    monkeypatch.setattr(open_loops, "_TRUE", np.inf)
+    rough = OpenLoops.of(A, U, U.T, [PLACE], names)
+    assert len(rough.A) == 2
+    assert np.abs(rough.eigenvalues(setting) - target).min() > 1e-2 * abs(target)
+
+
+@pytest.mark.parametrize(("off", "is_taken"), [(0.0, True), (1e-4, False)])
+def test_a_reduction_whose_answers_are_others_is_not_taken(off, is_taken):
+    loops = close_modes(0)
+    found = open_loops._reduced(loops, lambda s: loops.answer(s) + off)
+    assert (found is not None) is is_taken
+
+
 def test_a_large_system_is_reduced_as_one_whose_vectors_are_all_computed(monkeypatch):
     whole = close_modes(0)
     monkeypatch.setattr(open_loops, "REDUCED", 5)
+    monkeypatch.setattr(open_loops, "_FELT", 0.02)  # so that some are left out
+    monkeypatch.setattr(open_loops, "_TRUE", np.inf)
     expected = open_loops._reduced(whole)
     monkeypatch.setattr(open_loops, "MOST_VECTORS", 0)
     monkeypatch.setattr(np.linalg, "eig", None)  # which gives the vectors of all
@@ -156,6 +186,8 @@ def test_a_signal_that_acts_on_itself_closes_as_the_algebra_says():
 def test_a_reduced_system_names_its_modes(monkeypatch):
     """The eigenvalues that a reduction left out have no eigenvectors, and stand behind the others."""
     monkeypatch.setattr(open_loops, "REDUCED", 5)
+    monkeypatch.setattr(open_loops, "_FELT", 0.02)  # so that some are left out
+    monkeypatch.setattr(open_loops, "_TRUE", np.inf)
     loops = close_modes(0)
     assert len(loops.rest)
     seen = []

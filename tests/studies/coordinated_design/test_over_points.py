@@ -261,7 +261,7 @@ def test_a_fast_mode_that_a_lead_drives_stays_in_a_reduced_system(monkeypatch):
     blocks = [np.array([[-0.1 * w, w], [-w, -0.1 * w]]) for w in (slow, fast)]
     A = scipy.linalg.block_diag(*blocks, np.diag(-np.arange(1.0, 9.0)))
     U, V = np.zeros((len(A), 1)), np.zeros((1, len(A)))
-    U[:, 0], V[0] = 0.002, 0.002
+    U[:, 0], V[0] = 0.0002, 0.0002
     U[2, 0], V[0, 2] = 0.035, 0.035
     names = tuple(f"x{k}" for k in range(len(A)))
     setting = {P: PodSetting(400.0, lead_lag_turning(120.0, 8.0, 2))}
