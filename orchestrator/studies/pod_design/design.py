@@ -293,11 +293,12 @@ def design_pod(
     (prepared,) = case.prepare([target.scenario], overrides, request.step_size, None, request.files)
     rules: CaseDefinition = case
 
-    def naming(model: LinearModel, modes: list[Mode]) -> Mode | None:
+    def by_rules(model: LinearModel, modes: list[Mode]) -> Mode | None:
         # with a gain of any size, a tie counts as a change
         fitting = named_modes(rules, model, modes).fits.get(name)
         return None if fitting is None else fitting[0]
 
+    naming: Naming = by_rules
     for value, option in (
         (request.delta_gain, Option.DELTA_GAIN),
         (request.bounds(search=True)[1], Option.GAIN_BOUNDS),
@@ -324,15 +325,20 @@ def design_pod(
             model = loop.model(_OFF)
             before = surroundings(model, loop.spectrum(_OFF), None, naming)
             modes = [mode for mode in before.others if mode.is_oscillation]
+            reasons: Mapping[str, str] = {}
             if name == CRITICAL:
                 rules = replace(case, table=naming_critical(case.table, modes))
                 prepared = replace(prepared, case=rules)
-            names = identified(prepared, point, model, modes).naming
-            before = replace(before, named=names.named.get(name))
+                before = replace(before, named=next(iter(modes), None))
+                if naming(model, modes) is not before.named:  # its own rule fits another one better
+                    naming = _no_name
+            else:
+                names = identified(prepared, point, model, modes).naming
+                before, reasons = replace(before, named=names.named.get(name)), names.reasons
             if before.named is None:
                 low, high = ELECTROMECHANICAL_HZ
-                if name in names.reasons:
-                    raise InputError(f"scenario {target.scenario!r}: {names.reasons[name]}")
+                if name in reasons:
+                    raise InputError(f"scenario {target.scenario!r}: {reasons[name]}")
                 raise InputError(
                     f"scenario {target.scenario!r} shows no mode {name!r} between {low:g} and {high:g} Hz; "
                     f"modes there: {', '.join(f'{m.frequency_hz:.3f} Hz' for m in before.others) or 'none'}"
@@ -351,6 +357,11 @@ def design_pod(
                 search=search,
             )
             return _design(start, loop, report)
+
+
+def _no_name(model: LinearModel, modes: list[Mode]) -> Mode | None:
+    """Name no mode: what is followed is the target alone."""
+    return None
 
 
 @contextmanager

@@ -9,7 +9,11 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.cases.form.parameter_files import read_parameter_file
-from orchestrator.studies.pod_design.target import find_target
+from orchestrator.cases.form.schema import NamedModeTable
+from orchestrator.studies.coordinated_design.one_point import design_controller
+from orchestrator.studies.pod_design import design as module
+from orchestrator.studies.pod_design.design import DesignRequest
+from orchestrator.studies.pod_design.target import CRITICAL, find_target
 
 
 @pytest.fixture(autouse=True)
@@ -253,6 +257,29 @@ def test_a_tie_of_two_modes_is_no_target(gfor):
     assert code == 2
     assert "no mode is named 'electromechanical': the mode of 0.582 Hz, 10.59 %" in err
     assert "meets another one 50% of the way from there, at 0.276 Hz, 37.35 %" in err
+
+
+def test_the_least_damped_swing_is_the_target_though_another_mode_fits_its_own_rule_better(
+    monkeypatch, tmp_path
+):
+    """Planted: in a case without names, a rule for the least damped swing that fits the converter's mode."""
+    text = re.sub(r"(?m)^modes = .*$", "modes = []", load_case("two_area").text)
+    text = re.sub(r"(?ms)^\[reference\]$.*?(?=^\[(?!reference))", "", text)
+    (tmp_path / "unnamed.toml").write_text(text, encoding="utf-8")
+    tables = []
+
+    def planted(table, modes):
+        tables.append(modes)
+        rule = NamedModeTable(name=CRITICAL, states=["gfor.*"])
+        analysis = table.analysis.model_copy(update={"modes": [rule]})
+        return table.model_copy(update={"analysis": analysis})
+
+    monkeypatch.setattr(module, "naming_critical", planted)
+    request = DesignRequest("pod_p", margins=False)
+    found = design_controller(load_case(tmp_path / "unnamed.toml"), request).result
+    assert found.initial == pytest.approx(tables[0][0].eigenvalue)
+    assert found.before.other_named is None
+    assert found.met
 
 
 def test_a_case_whose_scenarios_leave_it_open(gfor, tmp_path):
