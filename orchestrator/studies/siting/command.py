@@ -51,7 +51,7 @@ STUDY = StudyAtOnce(
     prepared=lambda found: [found.result.prepared],
     parts=_parts,
     code=_code,
-    counted="places",
+    counted="steps",
     files="site.json, buses.csv and site.html with a map; for --device regulator machines.json, .csv and .html",
     warnings=_warnings,
 )

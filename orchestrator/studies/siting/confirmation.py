@@ -15,6 +15,7 @@ from orchestrator.core.options import Option
 from orchestrator.linear.models.component_linearization import ComponentLinearization
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.linearization import Blocks
+from orchestrator.linear.models.periodic import model_of
 from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.linear.spectra.continuation import Eigenpair, pairs_near
 from orchestrator.linear.spectra.modes import (
@@ -24,9 +25,11 @@ from orchestrator.linear.spectra.modes import (
     make_mode,
     oscillations,
 )
-from orchestrator.studies.modes.modes import ModesResult, modes_from, running
+from orchestrator.linear.spectra.stability import WHOLE
+from orchestrator.studies.modes.modes import SPARSE_BELOW, ModesResult, modes_from, running
 from orchestrator.studies.pod_design.closed_loop import Placed, PodLoop, PodSetting
 from orchestrator.studies.pod_design.lead_lag import LARGEST_TURN, NO_COMPENSATION, lead_lag_turning
+from orchestrator.studies.points.under_way import tell_doing
 from orchestrator.studies.siting.least_damping import GROWS, LeastDamping
 from orchestrator.studies.siting.placing import STAGES, name_at, response_of
 from orchestrator.studies.siting.residues import SeenMode
@@ -44,6 +47,9 @@ _EQUAL = 2e-4  # damping ratios in the same part of this size are equally good
 _GIVEN_UP = 1e-3
 """Least damping ratio that is given up for more damping of the followed mode: a mode that moves by no more is one that
 the controller does not move."""
+
+_LEAST_SEARCHED = 0.01
+"""Damping ratio below which modes are searched at least, also where the mode that is followed grows."""
 
 # least similarity with which a mode of the system with the device is taken for the one without it
 _SAME = 0.5
@@ -193,6 +199,7 @@ def confirmed(
     ``prepared``: With the device at the bus.
     ``known``: modes of the system without it; ``outside``: its swings outside of the range.
     ``controller``: ``pod_p`` or ``pod_q``, of at most a gain [pu of the rating]; None for a device as it is."""
+    tell_doing(f"device at {bus}: steady state and linear model")
     try:
         with running(prepared) as master:
             if controller is None:
@@ -210,6 +217,8 @@ def confirmed(
             )
     except CosimError as error:
         return Confirmation(bus, failure=str(error))
+    finally:
+        tell_doing()
 
 
 def _as_it_is(
@@ -221,8 +230,11 @@ def _as_it_is(
     *,
     outside: Sequence[Mode],
 ) -> Confirmation:
+    point = find_operating_point(master)
     blocks = Blocks(master, derivatives=True)
-    found = modes_from(prepared, master, find_operating_point(master), blocks, frequency_range)
+    tell_doing(f"device at {bus}: eigenvalues")
+    critical = _below_followed(seen.mode, model_of(master, blocks))
+    found = modes_from(prepared, master, point, blocks, frequency_range, critical)
     pair, eigenvalue = same_mode(seen.mode, found.model), seen.mode.eigenvalue
     predicted = _predicted(master, blocks.components[name_at(bus)], bus, seen) - eigenvalue
     coupled, least = pair.eigenvalue - eigenvalue, least_damped(found.modes, pair.eigenvalue)
@@ -235,6 +247,16 @@ def _as_it_is(
         stable=found.stability.stable,
         beside=_least_beside(outside, found.model),
     )
+
+
+def _below_followed(mode: Mode, model: LinearModel) -> float | None:
+    """Damping ratio below which modes of a system too large for all its eigenvalues are searched; None in others.
+
+    The least damped mode is the one that is followed, or has less damping than that."""
+    if len(model.names) <= WHOLE:
+        return None
+    followed = damping_ratio(same_mode(mode, model).eigenvalue)
+    return min(max(followed, _LEAST_SEARCHED), SPARSE_BELOW)
 
 
 def _with_pod(
@@ -261,6 +283,7 @@ def _with_pod(
     by_gain = shift(PodSetting(1.0, NO_COMPENSATION))
     if not by_gain:
         raise AnalysisError("a POD there does not move the mode at all")
+    tell_doing(f"device at {bus}: settings of its POD")
     looks = LeastDamping(loop, known, frequency_range)
     tuned, search = tuned_setting(loop, start, by_gain, eigenvalue, gain, looks=looks)
     trial = trial_of(tuned, by_gain, eigenvalue)

@@ -3,6 +3,7 @@
 import cmath
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from time import monotonic
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,11 +24,6 @@ from orchestrator.studies.operating_points.widening import Widening
 from orchestrator.studies.points.under_way import tell_doing
 from orchestrator.studies.siting.bus_ports import BusPorts
 from orchestrator.studies.siting.placing import ACTIVE, REACTIVE, ideal_support
-
-# Parts of the time that a situation takes, for its progress: measured in 240 buses and 103 machines
-_LINEAR = 0.02  # to the linear model
-_SPECTRUM = 0.15  # its eigenvalues
-_RESIDUES = 0.58  # all modes seen from all buses
 
 _ROUNDS = 12  # substitutions of the eigenvalue into the device's answer, each of which brings the shift nearer
 
@@ -160,13 +156,14 @@ def situation_of(
     buses = asked.looked_at(network.buses)
     outputs = [f"{table.grid}.{bus}.v_{part}" for bus in buses for part in ("re", "im")]
     inputs = [f"{table.grid}.{part}" for bus in buses for part in injection_names(bus)]
+    began = monotonic()
     tell_doing(f"{name}: steady state and linear model")
     with running(prepared) as master:
         point = find_operating_point(master)
         blocks = Blocks(master, inputs=inputs, outputs=outputs, derivatives=True)
-        tell_doing(f"{name}: eigenvalues", _LINEAR)
+        tell_doing(f"{name}: eigenvalues")
         found = modes_from(prepared, master, point, blocks.connected_alone(), frequency_range)
-        tell_doing(f"{name}: what each bus does", _LINEAR + _SPECTRUM)
+        tell_doing(f"{name}: what each bus does")
         ports = BusPorts.of(blocks, master.schedule, found.model, table.grid)
         values = master.components[table.grid].get([name.partition(".")[2] for name in outputs])
     parts = list(values.values())
@@ -178,11 +175,10 @@ def situation_of(
         text if text not in labels[:k] else f"{text} ({k + 1})" for k, text in enumerate(labels)
     ]
     seen: list[SeenMode] = []
-    places = asked.looked_into(buses)
+    places, first = asked.looked_into(buses), monotonic()
     for k, (label, mode) in enumerate(zip(labels, poor, strict=True)):
-        tell_doing(
-            f"{name}: buses by mode {k + 1} of {len(poor)}", 1 - _RESIDUES * (1 - k / len(poor))
-        )
+        part = part_of_time(began, first, k, len(poor), monotonic())
+        tell_doing(f"{name}: buses by mode {k + 1} of {len(poor)}", part)
         one = _seen(label, mode, ports, buses)
         if not places:
             places = tuple(one.strongest(voltages, asked.places, _PLACES))
@@ -191,6 +187,17 @@ def situation_of(
     tell_doing()
     knows_all = len(buses) == len(network.buses)
     return Situation(name, found, tuple(seen), voltages, knows_all=knows_all)
+
+
+def part_of_time(began: float, first: float, done: int, count: int, now: float) -> float:
+    """The part of a task's time that has passed, where modes alike are what is left of it; 0 before one is done.
+
+    ``began``, ``first``, ``now``: when the task and its first mode began, and the present [s].
+    ``done``, ``count``: modes that are done, and all of them."""
+    if not done:
+        return 0.0
+    left = (now - first) / done * (count - done)
+    return (now - began) / (now - began + left)
 
 
 def _eigenvectors(mode: Mode, model: LinearModel) -> tuple[Vector, Vector]:

@@ -153,20 +153,29 @@ def test_while_nothing_is_done_the_time_left_does_not_grow(monkeypatch):
 
 
 def test_what_is_being_done_is_told_with_its_part_of_the_next_one(monkeypatch):
-    """A search for places stood at "0 of 4 places" while it computed the intact network."""
+    """A search for places stood at "0 of 4 steps" while it computed the intact network."""
     now = [100.0]
     monkeypatch.setattr(progress_lines, "monotonic", lambda: now[0])
-    lines = ProgressLines("site", "places", shown=False)
+    lines = ProgressLines("site", "steps", shown=False)
     with counting():
         lines.report(0, 4)
-        tell_doing("intact: eigenvalues", 0.25)
-        now[0] += 30.0
-        assert lines.line() == "site: 0 of 4 places (intact: eigenvalues), 30 s, about 7.5 min left"
+        tell_doing("intact: eigenvalues")
         now[0] += 10.0
-        assert lines.line() == "site: still at 0 of 4 places (intact: eigenvalues), 40 s"
+        assert lines.line() == "site: 0 of 4 steps (intact: eigenvalues), 10 s"
+        tell_doing("intact: eigenvalues", 0.25)
+        now[0] += 20.0
+        assert lines.line() == "site: 0 of 4 steps (intact: eigenvalues), 30 s, about 7.5 min left"
+        now[0] += 10.0
+        assert lines.line() == "site: still at 0 of 4 steps (intact: eigenvalues), 40 s"
         tell_doing("intact: buses by mode 1 of 2", 0.5)
         assert lines.line().endswith("(intact: buses by mode 1 of 2), 40 s, about 4.7 min left")
-    assert lines.line() == "site: 0 of 4 places, 40 s"
+    assert lines.line() == "site: 0 of 4 steps, 40 s"
+
+
+def test_of_a_situation_the_time_left_is_that_of_its_modes():
+    """After 40 s, and 2 of 10 modes in 6 s more, 24 s are left."""
+    assert residues.part_of_time(0.0, 40.0, 0, 10, 40.0) == 0.0
+    assert residues.part_of_time(0.0, 40.0, 2, 10, 46.0) == pytest.approx(46 / 70)
 
 
 def test_a_search_for_places_tells_what_it_does_and_never_goes_back(monkeypatch):

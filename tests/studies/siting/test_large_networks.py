@@ -3,7 +3,9 @@
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.studies.siting import residues
+from orchestrator.linear.spectra.modes import damping_ratio
+from orchestrator.studies.modes import modes
+from orchestrator.studies.siting import confirmation, residues
 from orchestrator.studies.siting.study import DEVICE, SiteRequest, find_sites
 from orchestrator.studies.siting.view import Siting, as_json, remarks
 
@@ -12,8 +14,8 @@ FIRST_ORDER = 1e-2
 """What a support of 1 MW/Hz does to the voltage of its own bus changes its effect by less than this part."""
 
 
-def places(**asked):
-    return find_sites(load_case("wscc9"), SiteRequest("droop", confirm=0, **asked))
+def places(confirm=0, **asked):
+    return find_sites(load_case("wscc9"), SiteRequest("droop", confirm=confirm, **asked))
 
 
 def shifts(found, bus):
@@ -68,3 +70,21 @@ def test_of_buses_that_are_named_nothing_is_said_of_the_others(whole):
     shift = as_json(found)["buses"][0]["shift"]
     assert all(one["part_of_best"] is one["controllable"] is None for one in shift.values())
     assert "not looked at" in Siting(found).page_text()
+
+
+def test_in_a_system_too_large_only_modes_damped_less_than_the_followed_one_are_searched(
+    monkeypatch,
+):
+    expected = places(confirm=1).confirmations[0]
+    below, whole = [], modes.find_critical_modes
+
+    def searched(model, low, high, damping):
+        below.append(damping)
+        return whole(model, low, high, damping)
+
+    monkeypatch.setattr(confirmation, "WHOLE", 0)
+    monkeypatch.setattr(modes, "find_critical_modes", searched)
+    found = places(confirm=1).confirmations[0]
+    assert below == [pytest.approx(damping_ratio(found.with_device))]
+    assert found.least == pytest.approx(expected.least)
+    assert (found.stable, found.agrees) == (expected.stable, expected.agrees)
