@@ -16,7 +16,11 @@ from orchestrator.linear.models.component_linearization import ComponentLineariz
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.linearization import Blocks
 from orchestrator.linear.models.periodic import model_of
-from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.linear.models.steady_state import (
+    OperatingPoint,
+    begin_at,
+    find_operating_point,
+)
 from orchestrator.linear.spectra.continuation import Eigenpair, pairs_near
 from orchestrator.linear.spectra.modes import (
     Mode,
@@ -47,6 +51,12 @@ _EQUAL = 2e-4  # damping ratios in the same part of this size are equally good
 _GIVEN_UP = 1e-3
 """Least damping ratio that is given up for more damping of the followed mode: a mode that moves by no more is one that
 the controller does not move."""
+
+_AS_STILL = 2.0
+"""With a device that feeds nothing a system moves by at most this many times as much as without it: what is no more
+than that needs no Newton step."""
+
+_STILL = 1e-12  # and this change of a state over a communication step is none
 
 _LEAST_SEARCHED = 0.01
 """Damping ratio below which modes are searched at least, also where the mode that is followed grows."""
@@ -191,20 +201,24 @@ def confirmed(
     controller: str | None,
     gain: float,
     *,
-    known: Sequence[Mode] = (),
+    without: ModesResult,
     outside: Sequence[Mode] = (),
 ) -> Confirmation:
     """Compare a mode's predicted shift with that of the coupled FMUs.
 
     ``prepared``: With the device at the bus.
-    ``known``: modes of the system without it; ``outside``: its swings outside of the range.
+    ``without``: the system without it; ``outside``: its swings outside of the range.
     ``controller``: ``pod_p`` or ``pod_q``, of at most a gain [pu of the rating]; None for a device as it is."""
     tell_doing(f"device at {bus}: steady state and linear model")
     try:
         with running(prepared) as master:
+            rest = without.operating_point
+            begin_at(master, rest.states)
+            point = find_operating_point(master, accept=max(_STILL, _AS_STILL * rest.residual))
             if controller is None:
-                return _as_it_is(prepared, master, bus, seen, frequency_range, outside=outside)
-            find_operating_point(master)
+                return _as_it_is(
+                    prepared, master, point, bus, seen, frequency_range, outside=outside
+                )
             return _with_pod(
                 master,
                 bus,
@@ -212,7 +226,7 @@ def confirmed(
                 frequency_range,
                 controller=controller,
                 gain=gain,
-                known=known,
+                known=without.modes,
                 outside=outside,
             )
     except CosimError as error:
@@ -224,13 +238,13 @@ def confirmed(
 def _as_it_is(
     prepared: PreparedScenario,
     master: Master,
+    point: OperatingPoint,
     bus: str,
     seen: SeenMode,
     frequency_range: tuple[float, float],
     *,
     outside: Sequence[Mode],
 ) -> Confirmation:
-    point = find_operating_point(master)
     blocks = Blocks(master, derivatives=True)
     tell_doing(f"device at {bus}: eigenvalues")
     critical = _below_followed(seen.mode, model_of(master, blocks))

@@ -411,7 +411,7 @@ def _with_confirmations(
             request.frequencies,
             request.controller,
             request.gain,
-            known=result.intact.found.modes,
+            without=result.intact.found,
             outside=outside,
         )
 

@@ -4,7 +4,7 @@ import pytest
 
 from orchestrator.core.errors import AnalysisError
 from orchestrator.linear.models import steady_state
-from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.linear.models.steady_state import begin_at, find_operating_point
 from orchestrator.systems.coupling.master import Master
 from tests.support.scenarios import prepare_one
 
@@ -37,6 +37,16 @@ def test_a_wrong_start_is_moved_to_the_fixed_point_even_of_an_unstable_system():
         assert point.iterations >= 1
         assert point.residual < 1e-12
         assert find_operating_point(master).iterations == 0
+
+
+@pytest.mark.parametrize(("off", "is_begun_at"), [(0.0, True), (0.1, False)])
+def test_a_known_point_is_begun_at_where_less_moves_there(off, is_begun_at):
+    changed = {"sg2.theta_0": 0.05}
+    with master_of("base", changed) as master:
+        known = find_operating_point(master).states
+    with master_of("base", changed) as master:
+        begin_at(master, {name: value + off for name, value in known.items()})
+        assert (find_operating_point(master).iterations == 0) is is_begun_at
 
 
 # of the direction that one size of perturbation gives
