@@ -67,7 +67,7 @@ def measure(
         solve = model.shifted(s).solve_exactly
         return np.asarray(-V @ np.column_stack([solve(column) for column in U.T + 0j]))
 
-    return OpenLoops.of(model.A, U, V, there, model.names, D, answer)
+    return OpenLoops.of(model.A, U, V, there, model.names, D=D, answer=answer)
 
 
 def _loop(master: Master, place: PodPlace, before: ComponentLinearization) -> tuple[Vector, Vector]:

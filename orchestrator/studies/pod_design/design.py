@@ -18,7 +18,7 @@ from orchestrator.core.options import Option
 from orchestrator.core.threads import one_thread
 from orchestrator.linear.doubts.examination import Examination
 from orchestrator.linear.models.linear_model import LinearModel
-from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.linear.models.steady_state import OperatingPoint, find_operating_point
 from orchestrator.linear.spectra.continuation import pair_at
 from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ, Mode, damping_ratio
 from orchestrator.linear.spectra.stability import Stability
@@ -291,14 +291,6 @@ def design_pod(
     overrides = {key: value for key, value in request.overrides.items() if key not in own} | own
     name = mode_name(case, request.mode)
     (prepared,) = case.prepare([target.scenario], overrides, request.step_size, None, request.files)
-    rules: CaseDefinition = case
-
-    def by_rules(model: LinearModel, modes: list[Mode]) -> Mode | None:
-        # with a gain of any size, a tie counts as a change
-        fitting = named_modes(rules, model, modes).fits.get(name)
-        return None if fitting is None else fitting[0]
-
-    naming: Naming = by_rules
     for value, option in (
         (request.delta_gain, Option.DELTA_GAIN),
         (request.bounds(search=True)[1], Option.GAIN_BOUNDS),
@@ -323,22 +315,12 @@ def design_pod(
         examined = replace(examined, warnings=(*said, *examined.warnings))
         with _with_stability(examined.stability):
             model = loop.model(_OFF)
-            before = surroundings(model, loop.spectrum(_OFF), None, naming)
+            before = surroundings(model, loop.spectrum(_OFF), None, _no_name)
             modes = [mode for mode in before.others if mode.is_oscillation]
-            reasons: Mapping[str, str] = {}
-            if name == CRITICAL:
-                rules = replace(case, table=naming_critical(case.table, modes))
-                prepared = replace(prepared, case=rules)
-                before = replace(before, named=next(iter(modes), None))
-                if naming(model, modes) is not before.named:  # its own rule fits another one better
-                    naming = _no_name
-            else:
-                names = identified(prepared, point, model, modes).naming
-                before, reasons = replace(before, named=names.named.get(name)), names.reasons
+            named = _target_mode(prepared, point, model, modes, name)
+            before = replace(before, named=named.mode)
             if before.named is None:
                 low, high = ELECTROMECHANICAL_HZ
-                if name in reasons:
-                    raise InputError(f"scenario {target.scenario!r}: {reasons[name]}")
                 raise InputError(
                     f"scenario {target.scenario!r} shows no mode {name!r} between {low:g} and {high:g} Hz; "
                     f"modes there: {', '.join(f'{m.frequency_hz:.3f} Hz' for m in before.others) or 'none'}"
@@ -348,15 +330,54 @@ def design_pod(
                 case.name,
                 request,
                 target=target,
-                prepared=prepared,
+                prepared=named.prepared,
                 mode_name=name,
                 off=off,
                 before=before.without(before.named),
-                naming=naming,
+                naming=named.naming,
                 examined=examined,
                 search=search,
             )
             return _design(start, loop, report)
+
+
+@dataclass(frozen=True)
+class _Named:
+    """The mode with the target's name, None if there is none; what gives the name to a mode of other settings, and the
+    scenario with the rule for it."""
+
+    prepared: PreparedScenario
+    mode: Mode | None
+    naming: Naming
+
+
+def _target_mode(
+    prepared: PreparedScenario,
+    point: OperatingPoint,
+    model: LinearModel,
+    modes: Sequence[Mode],
+    name: str,
+) -> _Named:
+    """Find the target among modes, least damped first.
+
+    Raises `InputError` if none fits its name alone."""
+    case = prepared.case
+    if name == CRITICAL and modes:
+        case = replace(case, table=naming_critical(case.table, modes))
+
+    def naming(other: LinearModel, found: list[Mode]) -> Mode | None:
+        # with a gain of any size, a tie counts as a change
+        fitting = named_modes(case, other, found).fits.get(name)
+        return None if fitting is None else fitting[0]
+
+    if name == CRITICAL:
+        least = next(iter(modes), None)
+        its_own = naming(model, list(modes)) is least  # or its rule fits another one better
+        return _Named(replace(prepared, case=case), least, naming if its_own else _no_name)
+    names = identified(prepared, point, model, modes).naming
+    if name not in names.named and name in names.reasons:
+        raise InputError(f"scenario {prepared.name!r}: {names.reasons[name]}")
+    return _Named(prepared, names.named.get(name), naming)
 
 
 def _no_name(model: LinearModel, modes: list[Mode]) -> Mode | None:
