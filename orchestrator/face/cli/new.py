@@ -124,16 +124,18 @@ def _written(options: argparse.Namespace) -> int:
 
 
 def _start(prepared: PreparedScenario, wanted: WantedCase) -> list[str]:
-    """Start the machines of a scenario of the case that is written, and return warnings of their limiters.
+    """Start the machines of a scenario of the written case, and return warnings of their limiters and feedbacks.
 
     The error of what cannot start says what to type."""
     from orchestrator.cases.scenario.service import in_service  # noqa: PLC0415 - these import what a run needs
     from orchestrator.linear.doubts.excitation_limiters import limiter_warnings  # noqa: PLC0415
+    from orchestrator.linear.doubts.field_feedbacks import feedback_warnings  # noqa: PLC0415
     from orchestrator.studies.modes.modes import running  # noqa: PLC0415
 
     try:
         with running(in_service(prepared)) as master:
-            return [*limiter_warnings(master, f"gfor modes {shlex.quote(str(wanted.out))} --set")]
+            setting = f"gfor modes {shlex.quote(str(wanted.out))} --set"
+            return [*limiter_warnings(master, setting), *feedback_warnings(master, setting)]
     except StartError as error:
         first, *others = error.problems
         written = Problem(str(wanted.out), _after_refusal(prepared, wanted), first.kind)

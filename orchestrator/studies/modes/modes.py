@@ -29,6 +29,7 @@ from orchestrator.linear.doubts.common_speed import name_common_speed, tell_comm
 from orchestrator.linear.doubts.examination import Examination, examine
 from orchestrator.linear.doubts.excitation_limiters import limiter_warnings
 from orchestrator.linear.doubts.external_exciters import settled_warnings, start_warnings
+from orchestrator.linear.doubts.field_feedbacks import feedback_warnings
 from orchestrator.linear.doubts.motor_starts import motor_warnings
 from orchestrator.linear.models.component_linearization import ComponentLinearization
 from orchestrator.linear.models.device_start import misfits_of, sentences
@@ -226,7 +227,12 @@ def linearised(
     """The same before its eigenvalues are computed."""
     misfits, said = (
         misfits_of(master),
-        (*start_warnings(master), *limiter_warnings(master), *motor_warnings(master)),
+        (
+            *start_warnings(master),
+            *limiter_warnings(master),
+            *feedback_warnings(master),
+            *motor_warnings(master),
+        ),
     )
     point = find_operating_point(master)
     said += settled_warnings(master)

@@ -26,6 +26,7 @@ from orchestrator.devices.sandbox.protections_in_force import Protection, missin
 from orchestrator.linear.doubts.coupling_growth import coupling_growth
 from orchestrator.linear.doubts.excitation_limiters import limiter_warnings, warnings_at_end
 from orchestrator.linear.doubts.external_exciters import start_warnings
+from orchestrator.linear.doubts.field_feedbacks import feedback_warnings
 from orchestrator.linear.doubts.motor_starts import motor_warnings
 from orchestrator.linear.models.device_start import misfits_of, sentences
 from orchestrator.linear.models.linearization import Blocks, compose
@@ -263,6 +264,7 @@ def _modes_at_start(
         *sentences(misfits),
         *start_warnings(master),
         *limiter_warnings(master),
+        *feedback_warnings(master),
         *motor_warnings(master),
         *modes.warnings,
         *diverging,
