@@ -114,8 +114,10 @@ def _write_empty(figure, file, **how):
 
 
 @pytest.fixture
-def gfor(capsys):
-    """Run the command; returns exit code, standard output and standard error."""
+def gfor(capsys, monkeypatch):
+    """Run the command; returns exit code, standard output and standard error, without the lines of progress that come
+    every 30 s on a busy machine."""
+    monkeypatch.setattr("orchestrator.face.cli.progress_lines.EVERY", 3600.0)
 
     def run(*arguments):
         try:
