@@ -1,6 +1,6 @@
 """Limits of reactive power in a power flow: a bus whose units reach one feeds it, and its voltage follows."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,9 @@ Limits = Mapping[str, tuple[float, float]]
 
 _TOUCHED = 1e-6  # reactive power [pu, 100 MVA] beyond a limit that does not count
 
+_ROUNDED = 1e-3
+"""Reactive power [pu, 100 MVA] beyond a limit that is not told: a program solves to 0.1 Mvar, and a file rounds."""
+
 _ROUNDS = 40
 _RETURNS = 2  # so many times a bus may get its voltage back; then it stays at its limit
 
@@ -28,6 +31,11 @@ class Excess:
     # wanted, voltage: magnitude that the units would hold, and the one that it has [pu]
     wanted: float
     voltage: float
+
+    @property
+    def beyond(self) -> float:
+        """How far the reactive power is beyond the limit [pu, 100 MVA]."""
+        return abs(self.q - self.limit)
 
     def text(self, *, kept: bool) -> str:
         kind = "most" if self.q > self.limit else "least"
@@ -51,6 +59,12 @@ def exceeded(equations: FlowEquations, voltages: np.ndarray, limits: Limits) -> 
                     Excess(bus, float(q[k]), limit, float(equations.magnitudes[k]), magnitude)
                 )
     return found
+
+
+def worth_telling(found: Iterable[Excess]) -> tuple[Excess, ...]:
+    """Return those further beyond their limit than a file's rounding, the furthest first."""
+    told = (excess for excess in found if excess.beyond > _ROUNDED)
+    return tuple(sorted(told, key=lambda excess: -excess.beyond))
 
 
 def solve_with_limits(

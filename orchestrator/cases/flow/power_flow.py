@@ -16,7 +16,13 @@ from orchestrator.cases.flow.balance import (
     nodal_powers,
 )
 from orchestrator.cases.flow.equations import FlowEquations
-from orchestrator.cases.flow.limits import Excess, Limits, exceeded, solve_with_limits
+from orchestrator.cases.flow.limits import (
+    Excess,
+    Limits,
+    exceeded,
+    solve_with_limits,
+    worth_telling,
+)
 from orchestrator.cases.flow.newton import CONVERGED, NewtonResult, grow, solve, solve_once
 from orchestrator.core.errors import InputError, PowerFlowError, few
 from orchestrator.core.options import Option
@@ -138,9 +144,11 @@ def solve_power_flow(
         u.name: complex(u.P_0, u.Q_0) for u in units if u.connected and u.Q_0 is not None
     }
     powers |= {unit.name: 0j for unit in units if not unit.connected}
-    beyond = (
-        *exceeded(final, result.voltages, known),
-        *_fed_beyond(fixed, at_bus, limits or {}, voltages),
+    beyond = worth_telling(
+        [
+            *exceeded(final, result.voltages, known),
+            *_fed_beyond(fixed, at_bus, limits or {}, voltages),
+        ]
     )
     left = tuple(u.name for u in at_bus[slack_bus])
     return PowerFlow(
