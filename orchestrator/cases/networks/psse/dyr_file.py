@@ -13,10 +13,13 @@ from orchestrator.core.foreign_files import read_text, visible
 from orchestrator.core.units import LARGEST
 
 MOST_BYTES = 100_000_000  # of a file
-_TOKEN = re.compile(r"""(?P<quoted>'[^']*'|"[^"]*")|(?P<plain>[^\s,'"/]+)|(?P<slash>/)|,""")
+_TOKEN = re.compile(
+    r"""(?P<quoted>'[^']*'|"[^"]*")|(?P<plain>[^\s,'"/]+)|(?P<slash>/)|(?P<comma>,)"""
+)
 _MODEL = re.compile(r"[A-Za-z]\w{2,}")  # of a DC line, whose name stands where others have a bus
 _COMMENTS = ("//", "@!", "#")  # beginnings of lines that hold no record; # as public files have it
 EVENT = "TOGGLE"  # an event of ANDES, which writes some into its files of dynamics data
+_OF_HEAD = 3  # values with which a record begins: its bus, model and identifier
 _OWN_MODELS = (
     "USRMDL",
     "USRLOD",
@@ -99,6 +102,7 @@ def _records_in(file: str, text: str) -> tuple[DynamicRecord, ...]:
     tokens: list[str] = []
     begin = 0
     names = 0  # values in quotes with which the record begins
+    commas = 0  # since the last value
     for number, line in enumerate(text.splitlines(), start=1):
         if line.lstrip().startswith(_COMMENTS):
             continue
@@ -106,10 +110,14 @@ def _records_in(file: str, text: str) -> tuple[DynamicRecord, ...]:
             if token["slash"]:
                 if tokens:  # else a comment, or a slash alone
                     records.append(_record(file, begin, tokens, names))
-                tokens = []
+                tokens, commas = [], 0
                 break  # what follows on the line is a comment
-            if token["quoted"] or token["plain"]:
+            if token["comma"]:
+                commas += bool(tokens)
+            else:
                 begin, names = (begin, names) if tokens else (number, 0)
+                tokens += _empty_fields(f"{file}, line {begin}", tokens, commas)
+                commas = 0
                 names += bool(token["quoted"]) and names == len(tokens)
                 tokens.append(token["plain"] or token["quoted"][1:-1].strip())
     if tokens:
@@ -117,6 +125,24 @@ def _records_in(file: str, text: str) -> tuple[DynamicRecord, ...]:
             f"{file}, line {begin}", "the record does not end with a slash; the file is cut short"
         )
     return tuple(records)
+
+
+def _empty_fields(place: str, before: Sequence[str], commas: int) -> list[str]:
+    """Return the empty fields that stand between two values; the second of two commas ends one.
+
+    Those behind the last value are no fields: a record may end early.
+
+    Source: list-directed input of Fortran, in which a null value keeps its place.
+
+    Raises an `InputError` where the bus, the model or the identifier is empty."""
+    empty = [""] * (commas - 1)
+    if empty and len(before) < _OF_HEAD:
+        raise InputError.at(
+            place,
+            f"the record that begins with {' '.join(before)!r} has two commas with nothing between them where its bus, "
+            "model and identifier stand; write what is missing, or take one of the commas out",
+        )
+    return empty
 
 
 def facts_name(device: str) -> str:
@@ -207,6 +233,9 @@ def given_values(
 
     ``known``: names of models, which stand among its values where it has no slash at its end."""
     refuse_next(record, known)
+    for number, (field, text) in enumerate(zip(fields, record.values, strict=False), start=1):
+        if not text and not field.is_text:
+            raise _error_of_empty(record, f"field {number} ({field.name})")
     if len(record.values) != len(fields):
         raise InputError.at(
             record.place,
@@ -222,12 +251,23 @@ def given_values(
 
 def number_of_field(record: DynamicRecord, field: DyrField, text: str) -> float:
     """Return a field's number; an `InputError` where it is none."""
+    if not text:
+        raise _error_of_empty(record, field.name)
     value = number_in(text)
     if not abs(value) < LARGEST:
         raise InputError.at(
             record.place, f"{record.name} has {field.name} = {text!r}; it must be a number"
         )
     return value
+
+
+def _error_of_empty(record: DynamicRecord, field: str) -> InputError:
+    """Return the error about a field without a value, which keeps its place among the others."""
+    return InputError.at(
+        record.place,
+        f"{record.name}: {field} is empty: PSS/E's default for it is not in the file; write its value there, or "
+        "take one of the two commas out if no value is missing",
+    )
 
 
 def number_in(text: str) -> float:

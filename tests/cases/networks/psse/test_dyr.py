@@ -125,6 +125,13 @@ def test_records_over_lines_with_commas_or_blanks(tmp_path):
     assert records[0].place.endswith("grid.dyr, line 2")
 
 
+@pytest.mark.parametrize("comma", [" , ", ",\n  ", "\n  , "])
+def test_a_comma_with_blanks_or_the_end_of_a_line_is_one_separator(comma, tmp_path):
+    (tmp_path / "grid.dyr").write_text(f"1 'SEXS' 1 0.1 10.0{comma}100.0 0.05 -5.0 5.0 ,, /\n")
+    (record,) = read_dyr(tmp_path / "grid.dyr")
+    assert record.values == ("0.1", "10.0", "100.0", "0.05", "-5.0", "5.0")
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -134,6 +141,10 @@ def test_records_over_lines_with_commas_or_blanks(tmp_path):
             r"(?s)for these models.*\n +OLDEXC +1 +72 +line 6 .*gfor new --dyr-leave-out OLDEXC",
         ),
         ("3 'GENCLS'", "8 'GENCLS'", r"machine '1' at bus 3 has no record of a machine"),
+        ("100.0 0.05", "100.0,, 0.05", r"line 6: SEXS: field 4 \(TE\) is empty: PSS/E's default"),
+        ("0.5 1.0 0.0 2.1", "0.5,,0.0 2.1", r"line 7: TGOV1: field 3 \(VMAX\) is empty"),
+        ("0.06  9.55", "0.06,\n, 9.55", r"line 2: GENROU: field 5 \(H\) is empty"),
+        ("'GENROU' 1  8.96", "'GENROU',, 8.96", r"line 2: .* '1 GENROU' has two commas"),
         ("9.55", "x", r"line 2: GENROU has H = 'x'; it must be a number"),
         ("2.35 0.0 /", "2.35 /", r"line 5: GENCLS has 1 value, and needs 2: H, D"),
         ("7.0 0.0 /", "7.0 0.0", r"grid.dyr, line 7: the record does not end with a slash"),
