@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fmus.toolchain.dyr_form import DyrField
-from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, number_in
+from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, decimal_commas, number_in
 from orchestrator.cases.networks.psse.dyr_unit_records import RECORDS_OF_UNITS
 from orchestrator.cases.networks.psse.limiter_records import LIMITERS
 from orchestrator.cases.networks.psse.machine_model import ON_SHAFT
@@ -68,4 +68,5 @@ def doubt_of_count(record: DynamicRecord) -> DoubtOfRecord | None:
         names = ", ".join(field.name for field in known.fields[count:])
         taken = f"the others ({names}) are taken as 0, as in GridPACK"
     text = f"{record.name} has {number_of(count, 'value')}, and needs {needed}: {taken}; correct the record"
+    text += decimal_commas(record, needed)
     return DoubtOfRecord(known.kind, record.place, text, f"a number of values of {record.name}")

@@ -3,12 +3,12 @@
 import math
 import re
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
 from fmus.toolchain.dyr_form import DyrField
-from orchestrator.core.errors import InputError, number_of
+from orchestrator.core.errors import InputError, few, number_of
 from orchestrator.core.foreign_files import read_text, visible
 from orchestrator.core.units import LARGEST
 
@@ -17,6 +17,8 @@ _TOKEN = re.compile(
     r"""(?P<quoted>'[^']*'|"[^"]*")|(?P<plain>[^\s,'"/]+)|(?P<slash>/)|(?P<comma>,)"""
 )
 _MODEL = re.compile(r"[A-Za-z]\w{2,}")  # of a DC line, whose name stands where others have a bus
+_WHOLE_PAIR = re.compile(r"[-+]?\d+,\d+")
+_NAMED_PAIRS = 4  # that one question names
 _COMMENTS = ("//", "@!", "#")  # beginnings of lines that hold no record; # as public files have it
 EVENT = "TOGGLE"  # an event of ANDES, which writes some into its files of dynamics data
 _OF_HEAD = 3  # values with which a record begins: its bus, model and identifier
@@ -69,6 +71,8 @@ class DynamicRecord:
     )
     surplus: tuple[str, ...] = ()  # values that its model has no fields for, and that are not used
     lacking: int = 0  # how many of its last values are missing, and are taken as 0
+    # whole numbers among its values with a comma and no blank between them, as a decimal comma leaves them
+    whole_pairs: tuple[str, ...] = ()
 
     @property
     def place(self) -> str:
@@ -103,20 +107,24 @@ def _records_in(file: str, text: str) -> tuple[DynamicRecord, ...]:
     begin = 0
     names = 0  # values in quotes with which the record begins
     commas = 0  # since the last value
+    pairs: list[str] = []
     for number, line in enumerate(text.splitlines(), start=1):
         if line.lstrip().startswith(_COMMENTS):
             continue
         for token in _TOKEN.finditer(line):
             if token["slash"]:
                 if tokens:  # else a comment, or a slash alone
-                    records.append(_record(file, begin, tokens, names))
-                tokens, commas = [], 0
+                    record = _record(file, begin, tokens, names)
+                    records.append(replace(record, whole_pairs=tuple(pairs)) if pairs else record)
+                tokens, pairs, commas = [], [], 0
                 break  # what follows on the line is a comment
             if token["comma"]:
                 commas += bool(tokens)
             else:
                 begin, names = (begin, names) if tokens else (number, 0)
                 tokens += _empty_fields(f"{file}, line {begin}", tokens, commas)
+                if commas == 1 and len(tokens) > _OF_HEAD:
+                    pairs += _whole_pair(line, token, tokens[-1])
                 commas = 0
                 names += bool(token["quoted"]) and names == len(tokens)
                 tokens.append(token["plain"] or token["quoted"][1:-1].strip())
@@ -143,6 +151,25 @@ def _empty_fields(place: str, before: Sequence[str], commas: int) -> list[str]:
             "model and identifier stand; write what is missing, or take one of the commas out",
         )
     return empty
+
+
+def _whole_pair(line: str, token: re.Match[str], before: str) -> list[str]:
+    """Return a value with the one before it as ``120,0``, where both are whole numbers with a comma alone between."""
+    pair = f"{before},{token['plain']}"
+    is_whole = _WHOLE_PAIR.fullmatch(pair) is not None
+    return [pair] if is_whole and line[: token.end()].endswith(pair) else []
+
+
+def decimal_commas(record: DynamicRecord, needed: int) -> str:
+    """Return what to ask of a record with more values than needed, where decimal commas may be why; else nothing."""
+    surplus = len(record.values) + len(record.surplus) - needed
+    if surplus <= 0 or len(record.whole_pairs) < surplus:
+        return ""
+    pair = record.whole_pairs[0]
+    return (
+        f"; a decimal comma makes two values of one: is it so in {few(record.whole_pairs, _NAMED_PAIRS)}? Write "
+        f"{pair.replace(',', '.')} for {pair}"
+    )
 
 
 def facts_name(device: str) -> str:
@@ -240,7 +267,7 @@ def given_values(
         raise InputError.at(
             record.place,
             f"{record.name} has {number_of(len(record.values), 'value')}, and needs {len(fields)}: "
-            f"{', '.join(field.name for field in fields)}",
+            f"{', '.join(field.name for field in fields)}{decimal_commas(record, len(fields))}",
         )
     return {
         field.name: number_of_field(record, field, text)

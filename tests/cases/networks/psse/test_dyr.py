@@ -88,6 +88,11 @@ def test_records_become_parts_and_parameters(tables):
             "2.1 7.0 /",
             "TGOV1 has 6 values, and needs 7: the others (Dt) are taken",
         ),
+        (
+            "2.1 7.0 0.0 /",
+            "2.1 7.0 0,0 /",
+            "is it so in 0,0? Write 0.0 for 0,0",
+        ),
     ],
 )
 def test_a_record_with_a_value_more_or_less_is_read_and_asked_about(
