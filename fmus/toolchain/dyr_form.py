@@ -57,7 +57,8 @@ class DyrRecord:
     ``omissions``: what our part leaves out where a field, by its name, is not 0;
     ``without``: switches of our part that are off, as the record does not have what they switch; ``switched_on``:
     those that are on, as the record always has it; ``hears``: where limiters, by their kind, act on an exciter: ``0``
-    added to its voltage reference, ``1`` or ``2`` at a gate; behind ``UEL=2:`` where that field has that value."""
+    added to its voltage reference, ``1`` or ``2`` at a gate; behind ``UEL=2:`` where that field has that value;
+    ``approximated``: what the lists of models say where public sources differ."""
 
     kind: str
     part: str
@@ -67,6 +68,7 @@ class DyrRecord:
     without: tuple[str, ...] = ()
     switched_on: tuple[str, ...] = ()
     hears: Mapping[str, str] = field(default_factory=dict)
+    approximated: str = ""
 
 
 SIGNALS_OF_BUSES = (2, 5, 6)
@@ -149,6 +151,7 @@ def _record(table: Mapping[str, Any]) -> DyrRecord:
         without=names_of("without"),
         switched_on=names_of("switched_on"),
         hears=table.get("hears", {}),
+        approximated=table.get("approximated", ""),
     )
 
 

@@ -200,7 +200,7 @@ def _limits(record: DyrRecord) -> str:
     """Return what a part of ours cannot take of a record, and what it does not use."""
     unused = _unused(record)
     not_used = f"{', '.join(unused)} not used" if unused else ""
-    return _together(*_limited_fields(record), not_used)
+    return _together(*_limited_fields(record), not_used, record.approximated)
 
 
 def _limited_fields(record: DyrRecord) -> Iterator[str]:

@@ -9,6 +9,7 @@ from orchestrator.cases.networks.psse.dyr_counts import doubt_of_count
 from orchestrator.cases.networks.psse.dyr_file import DynamicRecord, given_values
 from orchestrator.cases.networks.psse.dyr_unit_records import RECORDS_OF_UNITS
 from orchestrator.cases.networks.psse.dyr_values import CEILING, FLOOR, chosen_ceiling
+from orchestrator.cases.networks.psse.exciter_doubts import doubts_of_exciters
 from orchestrator.cases.networks.psse.limiter_records import REACTIVE_LIMIT
 from orchestrator.cases.networks.psse.raw_network import Machine
 from orchestrator.cases.networks.unit_row import DoubtOfRecord
@@ -50,6 +51,7 @@ def doubts_of_machine(
     yield from _omissions(records)
     yield from _leads_without_lags(records)
     yield from _chosen_limits(records)
+    yield from doubts_of_exciters(records, values)
     yield from _offsets(records, values)
     yield from _inverse_times(records, values)
     yield from _of_oel2c(records, values)
