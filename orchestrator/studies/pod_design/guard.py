@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from orchestrator.core.arrays import Complex
+from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.continuation import pair_of
+from orchestrator.linear.spectra.mode_tracking import similarity
 from orchestrator.linear.spectra.modes import (
     ELECTROMECHANICAL_HZ,
     Mode,
@@ -109,21 +110,32 @@ def _as_before(before: Sequence[Mode], after: Sequence[Mode]) -> Iterator[tuple[
     """Each mode, least damped first, with the one that it was before; None for one that was not there.
 
     Those belong together whose shapes are alike, and whose eigenvalues are near; each belongs to one at most."""
-    unlike = np.array([[_unlikeness(one, other) for other in before] for one in after])
-    rows, columns = linear_sum_assignment(unlike.reshape(len(after), len(before)))
+    rows, columns = linear_sum_assignment(_unlikeness(after, before))
     was = dict(zip(rows.tolist(), columns.tolist(), strict=True))
     for row in sorted(range(len(after)), key=lambda k: after[k].damping_ratio):
         yield after[row], before[was[row]] if row in was else None
 
 
-def _unlikeness(one: Mode, other: Mode) -> float:
-    """How far two modes are from being one: 0 if their shapes and their eigenvalues are the same."""
-    away = abs(one.eigenvalue - other.eigenvalue) / abs(other.eigenvalue)
-    names = [name for name in one.shape if name in other.shape]
-    if not (one.left and other.left and names):
+def _unlikeness(after: Sequence[Mode], before: Sequence[Mode]) -> Numbers:
+    """Return how far each mode of a model is from each of another: 0 if their shapes and eigenvalues are the same.
+
+    Shape (len(after), len(before)). Modes whose left eigenvectors are not known are compared by their eigenvalues."""
+    mine, theirs = (np.array([mode.eigenvalue for mode in modes]) for modes in (after, before))
+    away: Numbers = np.abs(mine[:, None] - theirs) / np.abs(theirs)
+    names = [name for name in after[0].shape if name in before[0].shape] if away.size else []
+    if not (names and all(mode.left for mode in (*after, *before))):
         return away
-    alike = pair_of(one, names).similarity(pair_of(other, names))
-    return 1.0 - min(alike, 1.0) + away
+    left, right = _sides(after, names)
+    left_before, right_before = _sides(before, names)
+    alike = similarity(left, right, left_before, right_before)
+    unlike: Numbers = 1.0 - np.minimum(alike, 1.0) + away
+    return unlike
+
+
+def _sides(modes: Sequence[Mode], names: Sequence[str]) -> tuple[Complex, Complex]:
+    """Return the left and the right eigenvectors of modes in some states, each of shape (modes, names)."""
+    pairs = [pair_of(mode, names) for mode in modes]
+    return np.array([pair.left for pair in pairs]), np.array([pair.right for pair in pairs])
 
 
 def extremes(model: LinearModel) -> tuple[complex, complex | None]:

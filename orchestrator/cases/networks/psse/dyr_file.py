@@ -22,6 +22,7 @@ _NAMED_PAIRS = 4  # that one question names
 _COMMENTS = ("//", "@!", "#")  # beginnings of lines that hold no record; # as public files have it
 EVENT = "TOGGLE"  # an event of ANDES, which writes some into its files of dynamics data
 _OF_HEAD = 3  # values with which a record begins: its bus, model and identifier
+_BLANK = "0"  # what a blank text among the numbers says: IEEEG1 writes '' for a second machine that there is not
 _OWN_MODELS = (
     "USRMDL",
     "USRLOD",
@@ -127,7 +128,8 @@ def _records_in(file: str, text: str) -> tuple[DynamicRecord, ...]:
                     pairs += _whole_pair(line, token, tokens[-1])
                 commas = 0
                 names += bool(token["quoted"]) and names == len(tokens)
-                tokens.append(token["plain"] or token["quoted"][1:-1].strip())
+                text = token["plain"] or token["quoted"][1:-1].strip()
+                tokens.append(text or (_BLANK if len(tokens) >= _OF_HEAD else ""))
     if tokens:
         raise InputError.at(
             f"{file}, line {begin}", "the record does not end with a slash; the file is cut short"

@@ -130,6 +130,14 @@ def test_records_over_lines_with_commas_or_blanks(tmp_path):
     assert records[0].place.endswith("grid.dyr, line 2")
 
 
+def test_a_blank_text_among_numbers_is_none(tmp_path):
+    """As in the public IEEE39.dyr, where IEEEG1 has no second machine."""
+    (tmp_path / "grid.dyr").write_text("1 'IEEEG1' 1 0 '' 20.0 0.25 /\n1 'SEXS' ' ' 0.1 10.0 /\n")
+    governor, exciter = read_dyr(tmp_path / "grid.dyr")
+    assert governor.values == ("0", "0", "20.0", "0.25")
+    assert exciter.values == ("0.1", "10.0")
+
+
 @pytest.mark.parametrize("comma", [" , ", ",\n  ", "\n  , "])
 def test_a_comma_with_blanks_or_the_end_of_a_line_is_one_separator(comma, tmp_path):
     (tmp_path / "grid.dyr").write_text(f"1 'SEXS' 1 0.1 10.0{comma}100.0 0.05 -5.0 5.0 ,, /\n")
