@@ -4,14 +4,20 @@ The current follows the angle of the terminal voltage at once, as in the specifi
 no PLL. The emf of REGCA1 is the voltage that its current gives behind a reactance of the port, with an extrapolated
 terminal voltage."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from fmus.converter_parts.bus_voltage import ExtrapolatedVoltage, extrapolated_voltage
 from fmus.converter_parts.current_at_angle import port_of_current
-from fmus.toolchain.frames import power
+from fmus.toolchain.frames import Phasor, power
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.phasor_port import declare_master_step, declare_phasor_outputs, phasor_builder
+from fmus.toolchain.phasor_port import (
+    MasterStep,
+    declare_master_step,
+    declare_phasor_outputs,
+    phasor_builder,
+)
 from fmus.toolchain.port import DevicePort, declare_rating, device_port_of
 from fmus.toolchain.symbols import Expr
 from fmus.toolchain.variables import usual_beside
@@ -62,6 +68,39 @@ class _Plant:
     electrical: Electrical
 
 
+@dataclass(frozen=True)
+class _Begun:
+    """A model of a plant with what every one begins with; ``Z``: of its converter's emf [pu, S_n]."""
+
+    m: ModelBuilder
+    S_n: Expr
+    port: DevicePort
+    Z: Phasor
+    master: MasterStep
+    seen: ExtrapolatedVoltage
+
+    def declare_outputs(self, converter: Converter) -> None:
+        """Declare what the port and the currents that the converter feeds are."""
+        m = self.m
+        declare_phasor_outputs(m, self.port, converter.emf(m, self.master), self.Z)
+        active, reactive = converter.fed()
+        v = self.seen.value.magnitude()
+        m.output("V", v, "pu", "Voltage magnitude at the terminal", base="bus")
+        m.output("I_p_fed", active, "pu", "Active current", base="S_n")
+        m.output("I_q_fed", reactive, "pu", "Reactive current", base="S_n")
+
+
+def _begun(name: str, title: str, impedance: Callable[[ModelBuilder], Phasor]) -> _Begun:
+    m = phasor_builder(name, title, kind="converter", usual=USUAL)
+    S_n = declare_rating(m, S_N)
+    port = device_port_of(m, S_n, P_0)
+    Z = impedance(m)
+    master = declare_master_step(m)
+    seen = extrapolated_voltage(m, port, master)
+    seen.follow(m, port.v)
+    return _Begun(m, S_n, port, Z, master, seen)
+
+
 def regca1_phasor() -> Model:
     """REGCA1 with REECA1 or REECB1, with constant references."""
     title = "Plant of REGCA1 with REECA1 or REECB1 (phasor type)"
@@ -85,15 +124,10 @@ def regca1_repca1_remote_phasor() -> Model:
 
 def composed(name: str, title: str, makeup: Makeup) -> Model:
     """The plant of a makeup."""
-    m = phasor_builder(name, title, kind="converter", usual=USUAL)
-    S_n = declare_rating(m, S_N)
-    port = device_port_of(m, S_n, P_0)
-    Z = makeup.converter.impedance(m)
-    master = declare_master_step(m)
-    seen = extrapolated_voltage(m, port, master)
-    seen.follow(m, port.v)
-    converter = makeup.converter.converter(m, port, seen, Z)
-    plant = _declared(m, port, seen, converter, makeup, S_n)
+    begun = _begun(name, title, makeup.converter.impedance)
+    m, port, seen = begun.m, begun.port, begun.seen
+    converter = makeup.converter.converter(m, port, seen, begun.Z)
+    plant = _declared(m, port, seen, converter, makeup, begun.S_n)
     turbine, t = plant.turbine, plant.terminal
     own = plant.electrical.references
     start = own if turbine is None else References(turbine.reference_0(own.P, t), own.Q)
@@ -108,11 +142,7 @@ def composed(name: str, title: str, makeup: Makeup) -> Model:
         beyond = found.power - plant.electrical.power_0 - (references.P - start.P)
         turbine.close(m, t, beyond)
     plant.converter.follow(m, found.active, found.reactive)
-    declare_phasor_outputs(m, port, plant.converter.emf(m, master), Z)
-    active, reactive = plant.converter.fed()
-    m.output("V", seen.value.magnitude(), "pu", "Voltage magnitude at the terminal", base="bus")
-    m.output("I_p_fed", active, "pu", "Active current", base="S_n")
-    m.output("I_q_fed", reactive, "pu", "Reactive current", base="S_n")
+    begun.declare_outputs(plant.converter)
     m.output("I_p_command", found.active, "pu", "Command of active current", base="S_n")
     m.output("I_q_command", found.reactive, "pu", "Command of reactive current", base="S_n")
     if turbine is not None:
@@ -122,22 +152,13 @@ def composed(name: str, title: str, makeup: Makeup) -> Model:
 
 def type_3(name: str, title: str, *, has_pitch: bool) -> Model:
     """The turbine of WT3G1, WT3E1 and WT3T1, with WT3P1 or without."""
-    m = phasor_builder(name, title, kind="converter", usual=USUAL)
-    S_n = declare_rating(m, S_N)
-    port = device_port_of(m, S_n, P_0)
-    Z = port_of_machine(m)
-    master = declare_master_step(m)
-    seen = extrapolated_voltage(m, port, master)
-    seen.follow(m, port.v)
-    converter = Wt3g1(m, port, seen, Z, S_n)
+    begun = _begun(name, title, port_of_machine)
+    m, port, seen = begun.m, begun.port, begun.seen
+    converter = Wt3g1(m, port, seen, begun.Z, begun.S_n)
     turbine = Wt3(m, _terminal(port, seen, converter), converter, has_pitch=has_pitch)
     active, emf = turbine.close(m)
     converter.follow(m, active, emf)
-    declare_phasor_outputs(m, port, converter.emf(m, master), Z)
-    fed = converter.fed()
-    m.output("V", seen.value.magnitude(), "pu", "Voltage magnitude at the terminal", base="bus")
-    m.output("I_p_fed", fed[0], "pu", "Active current", base="S_n")
-    m.output("I_q_fed", fed[1], "pu", "Reactive current", base="S_n")
+    begun.declare_outputs(converter)
     m.output("I_p_command", active, "pu", "Command of active current", base="S_n")
     m.output("E_q_command", emf, "pu", "Command of the emf", base="bus")
     turbine.declare_outputs(m)
@@ -146,22 +167,13 @@ def type_3(name: str, title: str, *, has_pitch: bool) -> Model:
 
 def type_4(name: str, title: str) -> Model:
     """The turbine of WT4G1 and WT4E1."""
-    m = phasor_builder(name, title, kind="converter", usual=USUAL)
-    S_n = declare_rating(m, S_N)
-    port = device_port_of(m, S_n, P_0)
-    Z = port_of_current(m)
-    master = declare_master_step(m)
-    seen = extrapolated_voltage(m, port, master)
-    seen.follow(m, port.v)
-    converter = Wt4g1(m, port, seen, Z)
+    begun = _begun(name, title, port_of_current)
+    m, port, seen = begun.m, begun.port, begun.seen
+    converter = Wt4g1(m, port, seen, begun.Z)
     with m.scope("electrical"):
         active, reactive = commands_of_type_4(m, _terminal(port, seen, converter), converter)
     converter.follow(m, active, reactive)
-    declare_phasor_outputs(m, port, converter.emf(m, master), Z)
-    fed = converter.fed()
-    m.output("V", seen.value.magnitude(), "pu", "Voltage magnitude at the terminal", base="bus")
-    m.output("I_p_fed", fed[0], "pu", "Active current", base="S_n")
-    m.output("I_q_fed", fed[1], "pu", "Reactive current", base="S_n")
+    begun.declare_outputs(converter)
     m.output("I_p_command", active, "pu", "Command of active current", base="S_n")
     m.output("I_q_command", reactive, "pu", "Command of reactive current", base="S_n")
     return m.build()

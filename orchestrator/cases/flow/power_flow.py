@@ -58,7 +58,8 @@ class PowerFlow:
     residual: float  # largest power mismatch of a bus [pu, 100 MVA], recomputed from the voltages
     # buses that feed a limit of reactive power instead of holding their voltage
     at_limits: tuple[Excess, ...] = ()
-    # buses that hold their voltage beyond a limit, because the limits are not kept or the bus is the slack
+    # buses that hold their voltage beyond a limit, because the limits are not kept or the bus is the slack; the
+    # furthest beyond first
     beyond_limits: tuple[Excess, ...] = ()
     # what it was solved with; a transformer of three windings is three of them
     lines: tuple[FlowLine, ...] = ()

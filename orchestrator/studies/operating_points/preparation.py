@@ -220,7 +220,7 @@ class ItemPreparation:
         )
         already = {one.bus for one in before}
         found = [] if limits is False else [x for x in now if x.bus not in already]
-        return max(found, key=lambda x: abs(x.q - x.limit)).text(kept=False) if found else ""
+        return found[0].text(kept=False) if found else ""  # the furthest come first
 
     def held_fields(self, prepared: PreparedScenario) -> tuple[str, ...]:
         """A sentence where the new power flow asks constant fields of machines for another reactive power."""
