@@ -85,8 +85,12 @@ def keep_within(roots: Sequence[Path], results: Path) -> None:
 
 
 def is_within(path: Path, folders: Sequence[Path]) -> bool:
-    """Return whether a path, with its links followed, is in one of the folders or is one of them."""
-    place = path.resolve()
+    """Return whether a path, with its links followed, is in one of the folders or is one of them; not one of links
+    without an end."""
+    try:
+        place = path.resolve()
+    except RuntimeError:  # as Python 3.11 and 3.12 call a loop of links
+        return False
     return any(place.is_relative_to(folder) for folder in folders)
 
 

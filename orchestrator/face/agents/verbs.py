@@ -3,7 +3,7 @@
 import math
 import os
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ from orchestrator.face.agents.answers import (
 )
 from orchestrator.face.agents.guard import is_within
 from orchestrator.face.agents.question import Allowance, NoAnswerError, ask
+from orchestrator.output.results.lock import FolderInUseError, hold_folder
 
 VERBS = (
     "cases",
@@ -62,6 +63,9 @@ MOST_FILES = 200
 MOST_FOLDERS = 5_000
 """Folders in which `cases` looks for case files: a second of looking."""
 
+MOST_SERVERS = 20
+"""Servers that write into one folder of results, each with a folder of its own: one for each open conversation."""
+
 LONGEST_NAME = 1_000
 """Characters of a name or a path."""
 
@@ -79,6 +83,8 @@ class Verbs:
 
     def __init__(self, allowance: Allowance) -> None:
         self._allowance = allowance
+        self._held = ExitStack()  # the folder of results, until the server ends
+        self._folder: Path | None = None
 
     def cases(self) -> CasesAnswer:
         """List the cases that can be asked about: the built-in ones, and case files in the given folders."""
@@ -108,7 +114,7 @@ class Verbs:
     ) -> RunSummaryAnswer:
         """Simulate a scenario in time, with its events, up to ``stop`` [s], and tell what the run ends in."""
         further = [] if stop is None else ["--stop", repr(float(stop))]
-        further += ["--no-csv", "--out", str(self._allowance.results / "run")]
+        further += ["--no-csv", "--out", str(self._own_folder() / "run")]
         (found,) = self._ask("run", case, scenario, values, *further)
         answer = found["answer"]
         return RunSummaryAnswer(
@@ -132,7 +138,7 @@ class Verbs:
         further = ["--outages", _plain(outages, "outages")]
         if points is not None:
             further += ["--points", self._file(points)]
-        further += ["--out", str(self._allowance.results / "screen")]
+        further += ["--out", str(self._own_folder() / "screen")]
         found = self._ask("screen", case, scenario, None, *further)
         modes = sorted(found["modes"], key=lambda mode: mode["worst"]["damping_percent"])
         failures = [f"{_place(one)}: {one['why']}" for one in found["failures"]]
@@ -217,6 +223,21 @@ class Verbs:
             words += ["--set", f"{_plain(name, 'values')}={written}"]
         return ask(words, self._allowance)
 
+    def _own_folder(self) -> Path:
+        """Return where this server writes: the folder of results, or one in it if another server has that."""
+        results = self._allowance.results
+        for folder in (results, *(results / f"server_{k}" for k in range(2, MOST_SERVERS + 1))):
+            if self._folder is not None:
+                break
+            with suppress(FolderInUseError):
+                self._held.enter_context(hold_folder(folder))
+                self._folder = folder
+        if self._folder is None:
+            raise NoAnswerError(
+                f"{MOST_SERVERS} servers write into {results} already; end one, or start this one with --results"
+            )
+        return self._folder
+
     def _case(self, case: str) -> str:
         if case in built_in_cases():
             return case
@@ -231,8 +252,8 @@ class Verbs:
         """Return the path of a file in a given folder; a relative one starts in the first of them that has it."""
         given = Path(_plain(name, "file"))
         for root in self._allowance.roots:
-            path = (root / given).resolve()
-            with suppress(OSError):  # such as of a name that no file can have
+            with suppress(OSError, RuntimeError):  # a name that no file can have; links in a loop
+                path = (root / given).resolve()
                 if is_within(path, self._allowance.roots) and path.is_file():
                     return str(path)
         folders = ", ".join(str(root) for root in self._allowance.roots)

@@ -18,11 +18,23 @@ except ImportError:  # Windows
 LOCK = ".lock"
 
 
+class FolderInUseError(InputError):
+    """Another command works in a folder of results."""
+
+
 @contextmanager
 def hold_folder(folder: Path) -> Iterator[None]:
     """Hold a folder, which is made where it is missing; the lock ends with the process, whatever ends that.
 
-    Windows, and network drives without locks, have no such lock: there nobody is refused."""
+    Windows, and network drives without locks, have no such lock: there nobody is refused.
+
+    Raises
+    ------
+    FolderInUseError
+        If another command holds it.
+    InputError
+        If its lock cannot be made.
+    """
     made_folder(folder)
     if fcntl is None:
         yield
@@ -53,7 +65,7 @@ def _locked(path: Path) -> int:
         except BlockingIOError as error:
             holder = _holder(lock)
             os.close(lock)
-            raise InputError(
+            raise FolderInUseError(
                 f"{path.parent}: {holder} works in this folder, and two commands would destroy each other's "
                 "results; wait until it has ended, or choose another folder"
             ) from error

@@ -159,7 +159,27 @@ def test_cases_are_looked_for_where_they_can_be(tmp_path):
     for place in ("own/case.toml", ".hidden/case.toml"):
         (tmp_path / place).write_text("[components.grid]\n", encoding="utf-8")
     (tmp_path / "other.toml").write_text("[tool]\n", encoding="utf-8")
-    assert Verbs(allowance(tmp_path)).cases().files == [str(tmp_path / "own" / "case.toml")]
+    (tmp_path / "loop.toml").symlink_to("loop.toml")
+    verbs = Verbs(allowance(tmp_path))
+    assert verbs.cases().files == [str(tmp_path / "own" / "case.toml")]
+    with pytest.raises(NoAnswerError, match=r"loop\.toml: there is no such file"):
+        verbs.modes("loop.toml")
+
+
+def test_each_of_two_servers_writes_into_its_own_folder(tmp_path, monkeypatch):
+    written = []
+
+    def asked(words, _):
+        written.append(words[words.index("--out") + 1])
+        raise NoAnswerError("nobody answers")
+
+    monkeypatch.setattr("orchestrator.face.agents.verbs.ask", asked)
+    one, other = Verbs(allowance(tmp_path)), Verbs(allowance(tmp_path))
+    for server in (one, other, one):
+        with pytest.raises(NoAnswerError, match="nobody answers"):
+            server.run_summary("two_area", "base")
+    results = tmp_path / "results"
+    assert written == [str(results / name) for name in ("run", "server_2/run", "run")]
 
 
 def test_a_question_ends_in_time(tmp_path):
