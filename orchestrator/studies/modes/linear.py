@@ -143,7 +143,8 @@ def _spectra(
     states = len(model.names)
     if report is not None and states >= LEAST_STATES:
         what = "all eigenvalues" if states <= WHOLE else "what grows"
-        report(f"{what} of {states} states, as `gfor modes` has them, for the verdict on the model")
+        both = "" if system is None else " and of the continuous model"
+        report(f"{what} of {states} states, of the step map{both}, for the verdict on the model")
     with side_by_side(pays=states >= LEAST_STATES) as pool:
         of_map = pool.submit(_spectrum_with_modes, model)
         of_system = pool.submit(_spectrum_of, system)
