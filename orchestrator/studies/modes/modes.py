@@ -27,10 +27,8 @@ from orchestrator.core.threads import side_by_side
 from orchestrator.devices.binding.misfits import Misfit
 from orchestrator.linear.doubts.common_speed import name_common_speed, tell_common_speed
 from orchestrator.linear.doubts.examination import Examination, examine
-from orchestrator.linear.doubts.excitation_limiters import limiter_warnings
-from orchestrator.linear.doubts.external_exciters import settled_warnings, start_warnings
-from orchestrator.linear.doubts.field_feedbacks import feedback_warnings
-from orchestrator.linear.doubts.motor_starts import motor_warnings
+from orchestrator.linear.doubts.external_exciters import settled_warnings
+from orchestrator.linear.doubts.starts import warnings_at_start
 from orchestrator.linear.models.component_linearization import ComponentLinearization
 from orchestrator.linear.models.device_start import misfits_of, sentences
 from orchestrator.linear.models.linear_model import IDENTIFIED, LinearModel
@@ -227,12 +225,7 @@ def linearised(
     """The same before its eigenvalues are computed."""
     misfits, said = (
         misfits_of(master),
-        (
-            *start_warnings(master),
-            *limiter_warnings(master),
-            *feedback_warnings(master),
-            *motor_warnings(master),
-        ),
+        warnings_at_start(master),
     )
     point = find_operating_point(master)
     said += settled_warnings(master)

@@ -24,10 +24,8 @@ from orchestrator.devices.fmi.component import Component
 from orchestrator.devices.fmi.instance import is_isolated, protections_of
 from orchestrator.devices.sandbox.protections_in_force import Protection, missing
 from orchestrator.linear.doubts.coupling_growth import coupling_growth
-from orchestrator.linear.doubts.excitation_limiters import limiter_warnings, warnings_at_end
-from orchestrator.linear.doubts.external_exciters import start_warnings
-from orchestrator.linear.doubts.field_feedbacks import feedback_warnings
-from orchestrator.linear.doubts.motor_starts import motor_warnings
+from orchestrator.linear.doubts.excitation_limiters import warnings_at_end
+from orchestrator.linear.doubts.starts import warnings_at_start
 from orchestrator.linear.models.device_start import misfits_of, sentences
 from orchestrator.linear.models.linearization import Blocks, compose
 from orchestrator.linear.models.state_access import obstacle
@@ -262,10 +260,7 @@ def _modes_at_start(
     diverging = _diverging(master) if engine is None else []
     warnings = (
         *sentences(misfits),
-        *start_warnings(master),
-        *limiter_warnings(master),
-        *feedback_warnings(master),
-        *motor_warnings(master),
+        *warnings_at_start(master),
         *modes.warnings,
         *diverging,
     )

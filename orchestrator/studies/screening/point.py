@@ -12,6 +12,7 @@ import numpy as np
 from orchestrator.cases.case import Case, with_protection
 from orchestrator.cases.flow.sharing import SharingRule
 from orchestrator.cases.networks.branch_limits import Loading, Outlier, loadings, outliers
+from orchestrator.linear.doubts.starts import warnings_at_start
 from orchestrator.linear.models.apart import standing_apart
 from orchestrator.linear.models.linearization import Blocks
 from orchestrator.linear.models.slope_linearization import gives_slopes
@@ -241,6 +242,7 @@ class _Worker:
                 warnings = (*warnings, *self._preparation.held_fields(prepared.scenario))
             start = started(self._bench, self._preparation, item, prepared)
             prepared = start.prepared
+            warnings = (*warnings, *warnings_at_start(start.master))
             found = self._modes(start, neighbour, warnings, count=count)
             beyond, fed = (
                 self._preparation.overloads(prepared.scenario),

@@ -118,6 +118,19 @@ def test_a_warning_names_its_first_point(screened):
     assert text == "at 2 of 2, first at in, intact: a limit is close"
 
 
+def test_what_modes_warn_of_a_start_a_screening_warns_of_as_well():
+    """A feedback of the field voltage at its limit leaves no sign in the steady state."""
+    values = {"models": "phasor", "sg1.exciter": "esst3a", "sg1.exciter.K_G": 1.0}
+    values["sg1.exciter.V_GMAX"] = 1.5
+    found = face.load("kundur").screen(scenario="pss", values=values, outages=["sg2"])
+    for item in found.result.items:
+        (told,) = [text for text in item.record.warnings if "exciter.V_GMAX" in text]
+        assert told.startswith("sg1: the feedback of its field voltage does not act")
+    assert any(
+        "at 2 of 2, first at intact: sg1: the feedback" in text for text in remarks(found.summary)
+    )
+
+
 def test_units_beyond_their_rating_are_in_the_verdict_and_the_report():
     """Where nothing grows, a steady state that no plant bears is no answer."""
     found = face.load("two_area").screen(
