@@ -18,24 +18,41 @@ LEAST_CONTRAST = 4.5
 OF_TEXTS = """() => {
   const found = [], read = 'h1, h2, p, td, th, li, caption, figcaption, pre, svg text';
   for (const one of document.querySelectorAll(read)) {
-    const own = getComputedStyle(one), behind = [];
-    for (let at = one; at; at = at.parentElement) behind.push(getComputedStyle(at).backgroundColor);
+    const own = getComputedStyle(one), behind = [], filters = [];
+    for (let at = one; at; at = at.parentElement) {
+      behind.push(getComputedStyle(at).backgroundColor);
+      filters.push(getComputedStyle(at).filter);
+    }
     const ink = one.namespaceURI.endsWith('svg') ? own.fill : own.color;
-    found.push([one.tagName, ink, behind.find(x => !x.endsWith(', 0)')) ?? 'rgb(255, 255, 255)']);
+    const ground = behind.find(x => !x.endsWith(', 0)')) ?? 'rgb(255, 255, 255)';
+    found.push([one.tagName, ink, ground, filters.find(x => x !== 'none') ?? '']);
   }
   return found;
 }"""
 
 
-def luminance(colour):
-    """Relative luminance of ``rgb(r, g, b)``, by WCAG 2.1."""
+HALF_TURN = np.array([[-0.574, 1.430, 0.144], [0.426, 0.430, 0.144], [0.426, 1.430, -0.856]])
+"""What ``hue-rotate(180deg)`` does to red, green and blue, by the W3C's Filter Effects Module."""
+
+IN_THE_DARK = "invert(1) hue-rotate(180deg)"
+
+
+def shown(colour, through=""):
+    """Red, green and blue of ``rgb(r, g, b)`` from 0 to 1, behind a filter of the page."""
+    assert through in ("", IN_THE_DARK)
     parts = np.array([int(x) for x in re.findall(r"\d+", colour)[:3]]) / 255
+    return np.clip(HALF_TURN @ (1 - parts), 0, 1) if through else parts
+
+
+def luminance(parts):
+    """Relative luminance of red, green and blue, by WCAG 2.1."""
     linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
     return float(linear @ [0.2126, 0.7152, 0.0722])
 
 
-def contrast(one, other):
-    light, dark = sorted((luminance(one), luminance(other)), reverse=True)
+def contrast(ink, ground, through):
+    """Of a text, which a filter changes, and of what is behind it, which none does."""
+    light, dark = sorted((luminance(shown(ink, through)), luminance(shown(ground))), reverse=True)
     return (light + 0.05) / (dark + 0.05)
 
 
@@ -72,6 +89,37 @@ def texts_in_windows():
     return found
 
 
+LEAST_HEIGHT = 9.0
+"""Of a word in a narrow window [px]."""
+
+OF_WORDS = """() => {
+  const boxes = [...document.querySelectorAll('svg text')].map(x => [x.textContent, x.getBoundingClientRect()]);
+  const crosses = (a, b) => a.left < b.right && b.left < a.right && a.top + 3 < b.bottom && b.top + 3 < a.bottom;
+  const after = (one, k, a) => boxes.slice(k + 1).filter(([, b]) => crosses(a, b)).map(([other]) => [one, other]);
+  const heights = boxes.map(([, a]) => a.height), left = Math.min(...boxes.map(([, a]) => a.left));
+  return [heights, boxes.flatMap(([one, a], k) => after(one, k, a)), left];
+}"""
+
+
+@pytest.fixture(scope="module")
+def sizes():
+    return sizes_in_a_narrow_window()
+
+
+@computed_once
+def sizes_in_a_narrow_window():
+    """Heights of a chart's words [px], which of them cross, and the left end of the farthest one [px]."""
+    x = np.array([0.0, 20.0])
+    y = np.array([-3e-4, 1.2e-3])
+    chart = line_chart("c", "Time [s]", "omega [pu]", [ChartCurve("a", "#4d4d4d", x, y)])
+    with TemporaryDirectory() as folder, running_browser() as browser:
+        page = Path(folder) / "page.html"
+        page.write_text(document("A page", "kind", "", [("Part", chart)]), encoding="utf-8")
+        view = browser.new_page(viewport={"width": 390, "height": 844})
+        view.goto(page.as_uri())
+        return view.evaluate(OF_WORDS)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("window", ["light", "dark", "paper"])
 def test_every_text_stands_out(texts, window):
@@ -81,10 +129,22 @@ def test_every_text_stands_out(texts, window):
 
 
 @pytest.mark.slow
-def test_the_page_is_dark_its_pictures_are_light_and_paper_is_white(texts):
+def test_page_and_pictures_are_dark_in_a_dark_window_and_white_on_paper(texts):
     behind = {
-        window: {name: luminance(colour) for name, _, colour in texts[window]} for window in texts
+        window: {name: luminance(shown(ground)) for name, _, ground, _ in texts[window]}
+        for window in texts
     }
+    filters = {window: {through for *_, through in texts[window]} for window in texts}
     assert behind["dark"]["TD"] < 0.05
-    assert behind["dark"]["text"] > 0.7
-    assert behind["paper"]["TD"] == behind["light"]["TD"] == 1.0
+    assert behind["dark"]["text"] < 0.05
+    assert behind["paper"]["text"] == behind["paper"]["TD"] == behind["light"]["TD"] == 1.0
+    assert filters == {"light": {""}, "dark": {"", IN_THE_DARK}, "paper": {""}}
+
+
+@pytest.mark.slow
+def test_words_of_a_chart_can_be_read_in_a_narrow_window_and_do_not_cross(sizes):
+    """They had 4.7 px, as the whole picture was made smaller."""
+    heights, crossing, least_left = sizes
+    assert min(heights) > LEAST_HEIGHT
+    assert crossing == []
+    assert least_left >= 0
