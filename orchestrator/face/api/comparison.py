@@ -15,7 +15,7 @@ from orchestrator.output.results.recording_reader import in_memory
 from orchestrator.studies.signals.common_times import common_times
 from orchestrator.studies.signals.comparison import compare as compare_signal
 from orchestrator.studies.signals.comparison import most_different
-from orchestrator.studies.signals.signal_modes import RunComparison, doubt_text
+from orchestrator.studies.signals.signal_modes import RunComparison, doubts_by_run
 
 RINGS_FROM = 2.0
 """Oscillations are looked for from this time on [s], if nothing else is asked for."""
@@ -80,12 +80,7 @@ def compare(
         signals_compared = list(
             each(lambda one: compare_signal(first, second, one, begin, labels), chosen)
         )
-    remarks += [
-        f"? {label}: {c.expression} at {doubt_text(mode)}."
-        for c in signals_compared
-        for label, mode in zip(labels, c.modes, strict=True)
-        if mode is not None and mode.doubts
-    ]
+    remarks += doubts_by_run(labels, signals_compared)
     return RunComparison(
         labels, signals_compared, [*([times.remark] if times.remark else []), *remarks]
     )

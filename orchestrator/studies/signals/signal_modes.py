@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from orchestrator.core.errors import few
 from orchestrator.core.late import pd
 from orchestrator.linear.signals.identification import IdentifiedMode, Sampling
 from orchestrator.linear.signals.mode_doubts import (
@@ -20,6 +21,7 @@ from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.studies.signals.comparison import Comparison
 
 RARE = 1.0  # samples [s] that are further apart show no swing of machines
+_NAMED = 10  # signals with a doubtful oscillation that a sentence names; the others are counted
 
 
 @dataclass(eq=False, repr=False)
@@ -121,6 +123,23 @@ def identified_mode_json(mode: IdentifiedMode) -> dict[str, Any]:
 
 def doubt_text(mode: IdentifiedMode) -> str:
     return f"{mode.frequency_hz:.4g} Hz is doubtful: {'; '.join(mode.doubts)}"
+
+
+def doubts_by_run(labels: tuple[str, str], signals: Sequence[Comparison]) -> list[str]:
+    """Return a sentence for each run of which an oscillation is doubtful: which signals', and why the first is."""
+    told = []
+    for label, place in zip(labels, (0, 1), strict=True):
+        strongest = [(one.expression, one.modes[place]) for one in signals]
+        doubtful = [(name, mode) for name, mode in strongest if mode is not None and mode.doubts]
+        if doubtful:
+            (name, mode), *others = doubtful
+            more = (
+                f" So are those of {few([other for other, _ in others], _NAMED)}; 'doubts' of each mode says why."
+                if others
+                else ""
+            )
+            told.append(f"? {label}: {name} at {doubt_text(mode)}.{more}")
+    return told
 
 
 class RunComparison:

@@ -595,6 +595,8 @@ def rows(result: SiteResult) -> list[dict[str, Any]]:
 def ranking_table(result: SiteResult) -> ShownTable:
     """The best buses, and what they do to the least damped modes."""
     title, number = f"{unit(result, '100')}; best first", len(result.intact.modes)
+    if any("hardly" in _cells(result, bus) for bus in result.ranking[:_SHOWN]):
+        title += f"; hardly: less than {100 * HARDLY:g} % of what the best bus does"
     if number > _COLUMNS:
         title += f"; the {_COLUMNS} least damped of {number} modes, {Option.JSON} has all"
     return _table_of(result, title, result.ranking[:_SHOWN], _COLUMNS)

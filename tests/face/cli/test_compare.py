@@ -64,6 +64,26 @@ def test_without_signals_those_that_differ_most_are_shown(runs, capsys):
     assert out.index("b.omega") < out.index("a.omega")
 
 
+def test_doubtful_oscillations_are_told_in_a_sentence_for_each_run(tmp_path, gfor):
+    """Ten signals once had eighteen lines of doubts below their table."""
+    rings = {"a.omega": -3 + 4j, "b.omega": -4 + 5j, "c.omega": -0.3 + 6j}
+    folders = [tmp_path / "one", tmp_path / "two"]
+    for folder in folders:
+        data = {
+            name: ("time", 1 + 1e-3 * np.real(np.exp(value * TIMES)), {"units": "pu"})
+            for name, value in rings.items()
+        }
+        folder.mkdir()
+        run = xr.Dataset(data, {"time": TIMES})
+        run.to_netcdf(folder / "trajectory.nc", engine="scipy")
+    asked = [word for name in rings for word in ("--signal", name)]
+    _, out, _ = gfor("signal", "compare", *folders, *asked, "--start", "0")
+    told = [line for line in out.splitlines() if line.startswith("? ")]
+    assert [line.partition(": ")[0] for line in told] == [f"? {folder}" for folder in folders]
+    assert all("a.omega at 0.6366 Hz is doubtful: its damping of 60 %" in line for line in told)
+    assert all("So are those of b.omega; 'doubts' of each mode says why." in line for line in told)
+
+
 def test_runs_of_two_cases_are_told(tmp_path, gfor):
     one, same, other = (
         save(tmp_path / name, -0.3 + 4j, case=name, case_file=text)
