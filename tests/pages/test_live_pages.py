@@ -1,6 +1,7 @@
 """The pages that a newcomer opens before an install: small, alone, and with the figures of today."""
 
 import json
+import math
 import re
 from pathlib import Path
 
@@ -149,6 +150,24 @@ def test_a_doubled_gain_is_a_question_and_words_have_the_pages_size_on_a_phone(w
     assert f"with {least:.2f} %" in said
     assert heights
     assert min(heights) > 9  # [px]; they were 5
+
+
+def test_the_double_of_a_value_may_lie_between_two_that_were_computed(window):
+    """Kundur's tie has 0.11 pu, and 0.22 was not computed: the straight line there is told, with its error."""
+    path = ROOT / ".docs" / "live" / "kundur.html"
+    name, corners = "grid.X_tie_8_9_2", (0.1881, 0.246)
+    held = {tuple(one["values"].items()): one["answer"] for one in saved(path)["answers"]}
+    answers = [held[((name, x),)]["modes"]["scenarios"][0]["modes"] for x in corners]
+    growing = [next(complex(m["real"], m["imag"]) for m in one if m["real"] > 0) for one in answers]
+    part = (0.22 - corners[0]) / (corners[1] - corners[0])
+    between = (1 - part) * growing[0] + part * growing[1]
+    damping = f"{-100 * between.real / abs(between):.2f}".replace("-", "−")
+    view = window(viewport={"width": 1280, "height": 900})
+    view.goto(path.as_uri())
+    view.get_by_role("button", name=f"What if {name} is doubled?").click()
+    said = view.inner_text("#else-said")
+    assert f"≈ least damped {between.imag / math.tau:.3f} Hz with {damping} %" in said
+    assert "halfway off by less than 0.01 points. Computed nearby, with 0.246: UNSTABLE" in said
 
 
 def test_a_question_names_the_few_values_at_which_it_is_stable(window):

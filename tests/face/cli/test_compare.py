@@ -65,7 +65,7 @@ def test_without_signals_those_that_differ_most_are_shown(runs, capsys):
 
 
 def test_doubtful_oscillations_are_told_in_a_sentence_for_each_run(tmp_path, gfor):
-    """Ten signals once had eighteen lines of doubts below their table."""
+    """A line for each would be twenty below a table of ten signals."""
     rings = {"a.omega": -3 + 4j, "b.omega": -4 + 5j, "c.omega": -0.3 + 6j}
     folders = [tmp_path / "one", tmp_path / "two"]
     for folder in folders:

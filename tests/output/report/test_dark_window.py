@@ -143,7 +143,7 @@ def test_page_and_pictures_are_dark_in_a_dark_window_and_white_on_paper(texts):
 
 @pytest.mark.slow
 def test_words_of_a_chart_can_be_read_in_a_narrow_window_and_do_not_cross(sizes):
-    """They had 4.7 px, as the whole picture was made smaller."""
+    """A picture of 720 px that is made smaller as a whole leaves them 5 px."""
     heights, crossing, least_left = sizes
     assert min(heights) > LEAST_HEIGHT
     assert crossing == []

@@ -33,7 +33,7 @@ async function dragSaved(name, value) {
     seen.near = near;
     if (seen.dragged !== value) return;  // the slider went on
   }
-  const cell = SAVED.cells.find(one => (one.scenario ?? state.scenario) === state.scenario && Object.entries(one.at).every(([key, [low, high]]) => key in wanted && low <= wanted[key] && wanted[key] <= high));
+  const cell = cellAround(wanted);
   if (!cell || value === heldNear(name, value)) {
     if (seen.estimate) { seen.estimate = null; paintMap(); paintTable(); }
     paintVerdict();
@@ -113,12 +113,20 @@ function answerWith(name, value) {
   const at = SAVED.movers && value === ownOf(name) ? {} : { ...others, [name]: value };
   return SAVED.answers.find(one => one.scenario === state.scenario && Object.keys(one.values).length === Object.keys(at).length && Object.entries(at).every(([n, v]) => one.values[n] === v))?.answer;
 }
-// ... what the double of the case's value does, where it was computed, ...
-const isDoubled = name => ownOf(name) > 0 && SAVED.grid[name].includes(2 * ownOf(name));
+// The cell between computed values in which some values lie.
+const cellAround = wanted => SAVED.cells.find(one => (one.scenario ?? state.scenario) === state.scenario && Object.entries(one.at).every(([key, [low, high]]) => key in wanted && low <= wanted[key] && wanted[key] <= high));
+// ... what the double of the case's value does, computed or between two computed values, ...
+const isDoubled = name => ownOf(name) > 0 && 2 * ownOf(name) <= SAVED.grid[name].at(-1);
 function askDoubled(name) {
-  const value = 2 * ownOf(name), show = make("button", {}, "show it");
-  show.addEventListener("click", () => setSaved(name, value));
-  sayElse(`With ${name} = ${number(value)}: ${swingOf(answerWith(name, value))}. Now: ${swingOf(seen.answer)}. `, show);
+  const value = 2 * ownOf(name), near = heldNear(name, value), show = make("button", {}, "show it");
+  show.addEventListener("click", () => setSaved(name, near));
+  if (near === value) { sayElse(`With ${name} = ${number(value)}: ${swingOf(answerWith(name, value))}. Now: ${swingOf(seen.answer)}. `, show); return; }
+  const others = Object.keys(SAVED.movers ? {} : SAVED.grid).map(one => [one, heldNear(one, state.values[one] ?? ownOf(one))]);
+  const wanted = { ...Object.fromEntries(others), [name]: value }, cell = cellAround(wanted);
+  const least = cell && betweenOf(cell, wanted).sort((a, b) => a.damping - b.damping)[0];
+  const between = cell ? `≈ least damped ${fixed(least.hz, 3)} Hz with ${fixed(least.damping, 2)} %, between computed values, halfway off by ${cell.least < 0.01 ? "less than 0.01" : number(cell.least, 2)} points. Computed nearby, ` : "computed nearby, ";
+  show.textContent = `show ${number(near)}`;
+  sayElse(`With ${name} = ${number(value)}: ${between}with ${number(near)}: ${swingOf(answerWith(name, near))}. Now: ${swingOf(seen.answer)}. `, show);
 }
 // ... and which value of a slider damps most.
 function askBest(name) {
