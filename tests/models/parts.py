@@ -1,5 +1,7 @@
 """Single parts of a generator with inputs in place of what surrounds them, and a plain integration of a model."""
 
+from ctypes import c_double
+
 import numpy as np
 
 from fmus.synchronous_generator.excitation.common import Regulated
@@ -96,22 +98,20 @@ def limiter(values, **named):
 
 def integrated(model, inputs, end, step=1e-3, x=None):
     """Outputs at every step, by Runge-Kutta of order 4 with held inputs; ``inputs`` gives them at a time."""
-    rates, outputs = model.rates_and_outputs
-    x = np.array(model.x if x is None else x, dtype=float).tolist()
     names = [v.name for v in model.model.outputs]
+    z = (c_double * len(model.model.value_references))(*model.p, *model.c)
+    first_input = len(model.p) + len(model.c)
+    first_state = first_input + len(model.model.inputs)
+    first_output = first_state + len(model.x)
+    u, states = slice(first_input, first_state), slice(first_state, first_output)
+    outputs = slice(first_output, first_output + len(names))
+    z[states] = np.array(model.x if x is None else x, dtype=float).tolist()
     found = []
     for k in range(round(end / step)):
-        u = np.array(inputs(k * step), dtype=float).ravel().tolist()
-        (k1,) = rates([x, u])
-        (k2,) = rates([[a + step / 2 * k for a, k in zip(x, k1, strict=True)], u])
-        (k3,) = rates([[a + step / 2 * k for a, k in zip(x, k2, strict=True)], u])
-        (k4,) = rates([[a + step * k for a, k in zip(x, k3, strict=True)], u])
-        x = [
-            a + step / 6 * (r1 + 2 * r2 + 2 * r3 + r4)
-            for a, r1, r2, r3, r4 in zip(x, k1, k2, k3, k4, strict=True)
-        ]
-        found.append(dict(zip(names, *outputs([x, u]), strict=True)))
-    return found, np.array(x)
+        z[u] = np.array(inputs(k * step), dtype=float).ravel().tolist()
+        assert model.kernel.advance(z, step, 1) == 0  # all states are finite
+        found.append(dict(zip(names, z[outputs], strict=True)))
+    return found, np.array(z[states])
 
 
 def refused(model):

@@ -6,8 +6,8 @@ from functools import cached_property
 import numpy as np
 
 from fmus.toolchain.model import Model
-from fmus.toolchain.symbols import Function, symbols
 from tests.support.jacobians import jacobians
+from tests.support.kernels import taped
 from tests.support.written_out import written_out
 
 
@@ -32,14 +32,11 @@ class Evaluated:
         return self._named(self.model.states, self.x)
 
     @cached_property
-    def rates_and_outputs(self):
-        """Functions of lists [x, u] alone: what depends on parameters only is computed once."""
-        model = self.model
-        x, u = symbols("x", len(model.states)), symbols("u", len(model.inputs))
-        return [
-            Function(f.name, [x, u], f.of(x, u, self.p, self.c)).values
-            for f in (model.derivatives, model.outputs_function)
-        ]
+    def kernel(self):
+        """The same functions as compiled code executes them."""
+        assert self.model.integrator == "runge_kutta"
+        assert not any(state.stepwise for state in self.model.states)
+        return taped(self.model)
 
     def vector(self, states):
         """Values by name as the vector of states."""
