@@ -17,9 +17,11 @@ from orchestrator.face.cli import main
 from orchestrator.output.signatures import ssh_keygen
 from orchestrator.output.signatures.public_key import public_key_of
 from orchestrator.output.signatures.sshsig import as_armour, sign_with
-from orchestrator.studies.certification import kinds
+from orchestrator.studies.certification import kinds, verification
 from orchestrator.studies.certification import study as study_module
-from orchestrator.studies.certification.files import signatures_of, write_sealed
+from orchestrator.studies.certification.case_file import FMU
+from orchestrator.studies.certification.files import HTML, RESPONSES, signatures_of, write_sealed
+from orchestrator.studies.certification.form import case_files
 from tests.studies.certification.fabricated import rings
 from tests.studies.certification.test_recomputing import BOUND
 
@@ -64,6 +66,32 @@ def original(tmp_path_factory, fmu_path):
         patch.setattr(study_module, "compute_point", rings)
         assert main(list(map(str, words))) == 3
     return folder / "out"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def judged_once():
+    """Equal files that hold are judged again once: who signed them changes nothing of that.
+
+    `test_verification` has what judging again finds."""
+    judge, known = verification._judged_again, {}
+
+    def judged(folder, content, said, views):
+        names = {FMU, RESPONSES, HTML, *case_files(content), *content["files"]}
+        files = {name: file_hash(folder / name) for name in names if (folder / name).is_file()}
+        asked = json.dumps([content, files], sort_keys=True)
+        if asked not in known:
+            words, shown = [], []
+            if faults := judge(folder, content, words, shown):
+                return faults
+            known[asked] = words, shown
+        words, shown = known[asked]
+        said.extend(words)
+        views.extend(shown)
+        return []
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(verification, "_judged_again", judged)
+        yield
 
 
 @pytest.fixture(scope="module")
