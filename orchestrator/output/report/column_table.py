@@ -63,7 +63,7 @@ class ShownTable:
 
     def html(self) -> str:
         cells = [[_on_page(cell) for cell in row] for row in self.rows]
-        text = table_of_page(self.title, self.headings, cells, self.left)
+        text = table_of_page(self.title, self.headings, cells, self.left, self.texts)
         return f"{text}<p>{escape(self.note)}</p>" if self.note else text
 
 

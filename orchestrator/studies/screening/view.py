@@ -72,8 +72,8 @@ MODES = "modes.csv"
 SUMMARY = "screening.json"
 PAGE = "screening.html"
 
-_CLAUSE = re.compile(r"; |: (?=\d)")
-"""Ends the first clause of a cause: a remedy follows, or further figures."""
+_CLAUSE = re.compile(r"; |: (?=\d)|\. (?=[A-Z])")
+"""Ends the first clause of a cause: a remedy follows, further figures, or a sentence more."""
 _SHOWN = 4  # kinds of warnings that are listed; the others are counted
 _FEW = 6  # points that are named one by one
 _NAMED = 40  # outages of one cause that are named: a planner looks for each; items.csv has them all
@@ -337,7 +337,10 @@ def _why_unjudged(row: OutageRow) -> str:
     if not row.unjudged:
         return ""
     record = row.unjudged[0].record
-    return f"{record.status}: {_CLAUSE.split(record.cause or record.text, maxsplit=1)[0]}"
+    cause = (record.cause or record.text).removeprefix(
+        f"{str(record.status).removeprefix('no ')}: "
+    )
+    return f"{record.status}: {_CLAUSE.split(cause, maxsplit=1)[0]}"
 
 
 def _who(mode: ModeAt | None) -> str:

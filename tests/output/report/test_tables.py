@@ -427,6 +427,22 @@ def test_names_of_points_that_are_no_numbers_and_no_times_stay(names):
     assert ColumnTable("", columns, times).frame()["point"].dt.hour.tolist() == [0, 1]
 
 
+def test_a_reason_behind_figures_stands_at_the_left_of_its_column_on_a_page():
+    columns = [
+        Column[tuple[str, float, str]]("Outage", lambda row: row[0]),
+        Column[tuple[str, float, str]]("Damping [%]", lambda row: row[1], ".1f"),
+        Column[tuple[str, float, str]]("Why not", lambda row: row[2], text=True),
+    ]
+    page = ColumnTable("Outages", columns, [("l1", 6.0, "no way leads to b1")]).html()
+    assert re.findall(r"<t[dh] class=text>(.*?)<", page) == [
+        "Outage",
+        "Why not",
+        "l1",
+        "no way leads to b1",
+    ]
+    assert "<td>6.0</td>" in page
+
+
 def test_texts_that_differ_in_figures_only_are_one_kind_and_names_are_not_figures():
     said = [
         ("a", ["bus_1 feeds 70 Mvar", "bus_2 feeds 1 Mvar"]),

@@ -20,17 +20,23 @@ def item(**record):
     )
 
 
-def test_an_outage_without_any_verdict_is_told_by_its_first_point():
+@pytest.mark.parametrize(
+    ("cause", "told"),
+    [
+        ("no way leads to b1 from: 'b3'; close l23", "no way leads to b1 from: 'b3'"),
+        ("no solution found. The iterations end with 79.4 MW at 'b3'", "no solution found"),
+        ("79.4 MW unbalanced at b3: 747, 95.3, 79.4", "79.4 MW unbalanced at b3"),
+    ],
+)
+def test_an_outage_without_any_verdict_is_told_by_its_first_point(cause, told):
     plan = SimpleNamespace(
         wanted=SimpleNamespace(damping=0.2),
         points=("p07",) * 7,
         outages=(),
         prepared=SimpleNamespace(regions=SimpleNamespace(has_areas=False)),
     )
-    why = (
-        "line 9, power_flow: scenario 'base': power flow: no way leads to b1 from: 'b3'; close l23"
-    )
-    cause = "power flow: no way leads to b1 from: 'b3'; close l23"
+    cause = f"power flow: {cause}"
+    why = f"line 9, power_flow: scenario 'base': {cause}"
     lost = item(status=Status.POWER_FLOW, text=why, cause=cause)
     table = view.overview(SimpleNamespace(result=SimpleNamespace(plan=plan, items=(lost,))))
     assert [column.cell(table.rows[0]) for column in table.columns] == [
@@ -39,7 +45,7 @@ def test_an_outage_without_any_verdict_is_told_by_its_first_point():
         "",
         "–",
         "1 of 1",
-        "no power flow: power flow: no way leads to b1 from: 'b3'",
+        f"no power flow: {told}",
     ]
 
 

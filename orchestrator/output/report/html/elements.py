@@ -13,11 +13,19 @@ from orchestrator.cases.networks.element_names import ElementNames
 
 
 def table(
-    caption: str, columns: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1
+    caption: str,
+    columns: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    left: int = 1,
+    texts: Sequence[bool] = (),
 ) -> str:
+    """A table of a page: the ``left`` first columns hold text, and those further ones of which ``texts`` says so."""
+    of_text = {*range(left), *(k for k, is_text in enumerate(texts) if is_text)}
+
     def cells(tag: str, values: Sequence[str]) -> str:
         return "".join(
-            f"<{tag}{' class=text' if k < left else ''}>{v}</{tag}>" for k, v in enumerate(values)
+            f"<{tag}{' class=text' if k in of_text else ''}>{v}</{tag}>"
+            for k, v in enumerate(values)
         )
 
     head = cells("th", [escape(c) for c in columns])
