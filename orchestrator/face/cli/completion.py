@@ -1,10 +1,12 @@
-"""``gfor completion``: the text that a shell needs to complete commands, options, cases, scenarios, codes and files."""
+"""``gfor completion``: the text that a shell needs to complete commands, options, cases, scenarios, names of values,
+codes and files."""
 
 import argparse
 import tomllib
 from pathlib import Path
 
-from orchestrator.cases.case import BUILT_IN, built_in_cases
+from orchestrator.cases.case import BUILT_IN, built_in_cases, load_case
+from orchestrator.core.errors import InputError
 from orchestrator.systems.coupling.no_trip_regions import NO_TRIP_REGIONS, read_no_trip_code
 
 SHELLS = ("bash", "zsh", "fish")
@@ -32,7 +34,26 @@ _gfor_scenarios() {{
     compgen -W "$(_gfor_scenarios_of "$word")" -- "$1"
   done
 }}
+_gfor_values() {{
+  local word
+  for word in "${{COMP_WORDS[@]}}"; do
+    case "$word" in
+      {patterns}) "${{COMP_WORDS[0]}}" completion --values-of "$word" --begun "$1" 2>/dev/null; return ;;
+    esac
+  done
+}}
 """
+
+_AT_THE_END_IN_BASH = """
+_gfor_complete() {
+  _shtab__gfor "$@"
+  case "${COMPREPLY[0]}" in
+    *=|*.) compopt -o nospace ;;
+  esac
+}
+complete -o bashdefault -F _gfor_complete gfor
+"""
+"""Lets the cursor stay behind a name whose value is to come."""
 
 _IN_ZSH = """\
 _gfor_cases() {{
@@ -45,6 +66,14 @@ _gfor_scenarios() {{
     compadd -- $(_gfor_scenarios_of "$word")
   done
 }}
+_gfor_values() {{
+  local word
+  for word in $words; do
+    case "$word" in
+      {patterns}) compadd -S '' -- $(gfor completion --values-of "$word" --begun "$PREFIX" 2>/dev/null); return ;;
+    esac
+  done
+}}
 """
 
 _IN_FISH = """\
@@ -54,6 +83,16 @@ function _gfor_scenarios
 {lines}
       case '*.toml'
         {in_file}
+    end
+  end
+end
+function _gfor_values
+  set -l tokens (commandline -opc)
+  for word in $tokens
+    switch $word
+      case {patterns}
+        $tokens[1] completion --values-of $word --begun (commandline -ct) 2>/dev/null
+        return
     end
   end
 end
@@ -87,14 +126,26 @@ _FILES = ("FILE.fmu", "DEVICE", "NETWORK", "vendor.toml", "[NAME=]FILE")
 """Metavariables of the arguments that take a file or something else, so that they are not read as a path."""
 
 
+_VALUE = "COMPONENT.PARAMETER="
+"""How the metavariables of arguments begin that take a value by its name."""
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("shell", choices=SHELLS, help="the shell that reads the result")
+    parser.add_argument("shell", nargs="?", choices=SHELLS, help="the shell that reads the result")
+    # what the shells ask while a line is typed
+    parser.add_argument("--values-of", metavar="CASE", help=argparse.SUPPRESS)
+    parser.add_argument("--begun", metavar="TEXT", default="", help=argparse.SUPPRESS)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = _LOADED
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the completions; cases are those that are built in today, beside files."""
+    if options.values_of is not None:
+        print("\n".join(_values_of(options.values_of, options.begun)))
+        return 0
+    if options.shell is None:
+        raise InputError(f"name the shell that reads the result: {', '.join(SHELLS)}")
     import shtab  # noqa: PLC0415 - no other command needs it
 
     from orchestrator.face.cli import whole_parser  # noqa: PLC0415 - it imports every command
@@ -105,6 +156,7 @@ def run(options: argparse.Namespace) -> int:
     words = {read_code: (*CODES, ALL), read_no_trip_code: (*NO_TRIP_REGIONS,)}
     of_cases = _in_shells("_gfor_cases", _CASES_IN_FISH.format(cases=cases))
     of_scenarios = _in_shells("_gfor_scenarios", "(_gfor_scenarios)")
+    of_values = _in_shells("_gfor_values", "(_gfor_values)")
     for action in _actions_of(parser):
         if action.choices is not None or action.nargs == 0:
             continue
@@ -114,12 +166,16 @@ def run(options: argparse.Namespace) -> int:
             action.complete = of_cases  # type: ignore[attr-defined]  # shtab's own attribute
         elif "--scenario" in action.option_strings:
             action.complete = of_scenarios  # type: ignore[attr-defined]
+        elif str(action.metavar).startswith(_VALUE):
+            action.complete = of_values  # type: ignore[attr-defined]
         elif action.metavar in _FOLDERS:
             action.complete = shtab.DIRECTORY  # type: ignore[attr-defined]
         elif action.type is Path or action.metavar in _FILES:
             action.complete = shtab.FILE  # type: ignore[attr-defined]
     preamble = _preamble(options.shell, cases)
     print(shtab.complete(parser, options.shell, root_prefix="_gfor", preamble=preamble))
+    if options.shell == "bash":
+        print(_AT_THE_END_IN_BASH)
     return 0
 
 
@@ -135,10 +191,31 @@ def _preamble(shell: str, cases: str) -> str:
             f"      case {case}\n        string split ' ' -- '{found}'"
             for case, found in names.items()
         )
-        return _IN_FISH.format(lines=lines, in_file=_IN_FILE.replace("$1", "$word"))
+        patterns = " ".join([*names, "'*.toml'"])
+        in_file = _IN_FILE.replace("$1", "$word")
+        return _IN_FISH.format(lines=lines, in_file=in_file, patterns=patterns)
     lines = "\n".join(f'    {case}) echo "{found}" ;;' for case, found in names.items())
-    own = {"bash": _IN_BASH, "zsh": _IN_ZSH}[shell].format(cases=cases)
+    own = {"bash": _IN_BASH, "zsh": _IN_ZSH}[shell].format(
+        cases=cases, patterns="|".join([*names, "*.toml"])
+    )
     return _IN_POSIX.format(lines=lines, in_file=_IN_FILE) + own
+
+
+def _values_of(case: str, begun: str) -> list[str]:
+    """Return the names that ``--set`` takes of a case and that begin so; those of components alone before the dot."""
+    file = load_case(case)
+    scenarios = file.table.scenarios
+    fullest = min(scenarios, key=lambda name: len(scenarios[name].remove))
+    (prepared,) = file.prepare([fullest])
+    plans = prepared.system.components
+    if "." not in begun:
+        return [f"{name}." for name in plans if name.startswith(begun)]
+    component = begun.partition(".")[0]
+    if component not in plans:
+        return []
+    variables = plans[component].description.variables.items()
+    names = (f"{component}.{name}=" for name, one in variables if one.causality == "parameter")
+    return [name for name in names if name.startswith(begun)]
 
 
 def _scenarios_of(case: str) -> list[str]:

@@ -18,7 +18,7 @@ COMP_CWORD={last}
 COMP_LINE="{words}"
 COMP_POINT=${{#COMP_LINE}}
 function=$(complete -p gfor | sed 's/.* -F \\([^ ]*\\).*/\\1/')
-$function gfor "${{COMP_WORDS[COMP_CWORD]}}" "${{COMP_WORDS[COMP_CWORD-1]}}" 2> /dev/null
+$function "${{COMP_WORDS[0]}}" "${{COMP_WORDS[COMP_CWORD]}}" "${{COMP_WORDS[COMP_CWORD-1]}}" 2> /dev/null
 printf '%s\\n' "${{COMPREPLY[@]}}"
 """
 
@@ -61,12 +61,37 @@ def complete(folder, words):
         ("gfor certify gfor.fmu --code nts", {"nts631"}),
         ("gfor run two_area --protection ''", {"prc029"}),
         ("gfor run two_area --stop ''", set()),
-        ("gfor modes own_case.toml --set ''", set()),
+        ("gfor modes missing.toml --set ''", set()),
         ("gfor fmu check --binding own", {"own_case.toml"}),
     ],
 )
 def test_bash_offers(folder, words, offered):
     assert complete(folder, words) == offered
+
+
+@pytest.mark.parametrize(
+    ("begun", "offered"),
+    [
+        ("", {"gfor.", "grid."}),
+        ("gf", {"gfor."}),
+        ("gfor.pod_p.K", {"gfor.pod_p.K="}),
+        ("gfor.droop.R", {"gfor.droop.R_f=", "gfor.droop.R_V="}),
+        ("sg7.", set()),
+    ],
+)
+def test_values_of_a_case_are_offered_by_component_and_then_by_name(gfor, begun, offered):
+    _, out, _ = gfor("completion", "--values-of", "infinite_bus", "--begun", begun)
+    assert set(out.split()) == offered
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")
+def test_bash_asks_the_command_for_values_of_the_case_on_the_line(folder):
+    """A stand-in for the command says what it was asked."""
+    asked = folder / "gfor"
+    asked.write_text('#!/bin/sh\necho "asked_$5_of_$3="\n', encoding="utf-8")
+    asked.chmod(0o755)
+    offered = complete(folder, "./gfor sweep two_area --vary gfor.po")
+    assert offered == {"asked_gfor.po_of_two_area="}
 
 
 @pytest.mark.skipif(shutil.which("fish") is None, reason="there is no fish")
