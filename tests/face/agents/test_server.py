@@ -3,6 +3,7 @@
 import sys
 
 import anyio
+import jsonschema
 import pytest
 
 import orchestrator as gfor
@@ -60,11 +61,13 @@ def answers(tmp_path_factory):
 
 
 def test_every_verb_only_reads_and_has_a_schema_with_units(answers):
-    _, (tools, _) = answers
+    _, (tools, (listed, found, *_)) = answers
     assert {tool.name for tool in tools} == VERBS
     assert all(tool.annotations.read_only_hint and tool.description for tool in tools)
-    (modes,) = [tool for tool in tools if tool.name == "modes"]
-    assert "[Hz]" in str(modes.output_schema)
+    schemas = {tool.name: tool.output_schema for tool in tools}
+    assert "[Hz]" in str(schemas["modes"])
+    for name, result in (("cases", listed), ("modes", found)):
+        jsonschema.validate(result.structured_content, schemas[name])
 
 
 @pytest.mark.slow
