@@ -72,6 +72,7 @@ from orchestrator.cases.scenario.removed_parts import without_removed_parts
 from orchestrator.core.errors import InputError, Problem, few
 
 UNIT_KINDS = ("sg", "gfor")  # first parts of the names of a unit's generator and converter
+_MOST_NAMED = 8  # units or buses that an error lists; the others are counted
 _EXCITER = ".exciter"  # end of a scenario's key that names one
 _PHASOR = "_phasor"  # end of the names of phasor models
 _SOURCES = ("raw", "matpower", "pandapower", "cgmes")  # keys of a network's file of another program
@@ -105,7 +106,9 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
     draft.reactive_limits |= {row.bus: (row.q_min_mvar, row.q_max_mvar) for row in rows}
     for row in rows:
         if draft.data is not None and draft.data.buses and row.bus not in draft.data.buses:
-            hint = close_names(row.bus, draft.data.buses, f"there are: {few(draft.data.buses, 8)}")
+            hint = close_names(
+                row.bus, draft.data.buses, f"there are: {few(draft.data.buses, _MOST_NAMED)}"
+            )
             text = f"the unit at bus {row.label}: the network has no bus {row.bus!r}; {hint}"
             draft.note_network(row.place or draft.given.place("units"), text)
     alphas = _alphas(draft, table, rows)
@@ -531,7 +534,7 @@ def _alphas(draft: Draft, table: UnitsTable, rows: Sequence[UnitRow]) -> dict[st
     for label in table.replace:
         if label not in alphas:
             known = [*alphas, WITHOUT_RECORD] if table.dyr else [*alphas]
-            hint = close_names(label, known, f"there are: {', '.join(alphas)}")
+            hint = close_names(label, known, f"there are: {few(alphas, _MOST_NAMED)}")
             draft.note(draft.given.place("units", "replace"), f"there is no unit {label!r}; {hint}")
             continue
         alphas[label] = 1.0
@@ -539,7 +542,7 @@ def _alphas(draft: Draft, table: UnitsTable, rows: Sequence[UnitRow]) -> dict[st
     for choice in (choice for layer in draft.given.layers for choice in layer.shares):
         label = choice.label
         if label and label not in alphas:
-            hint = close_names(label, alphas, f"there are: {', '.join(alphas)}")
+            hint = close_names(label, alphas, f"there are: {few(alphas, _MOST_NAMED)}")
             draft.note(choice.place, f"there is no unit {label!r}; {hint}")
             continue
         try:
