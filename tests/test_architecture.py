@@ -33,7 +33,7 @@ FLOORS = {
         ("assignment", "bisection", "options"),
         ("errors",),
         ("asked", "attributes", "foreign_files", "question_kinds"),
-        ("safe_files", "toml_files", "truth"),
+        ("file_hashes", "safe_files", "toml_files", "truth"),
     ),
     "devices": (("sandbox",), ("fmi",), ("binding",), ("acceptance",)),
     "systems": (("coupling",), ("ssp",)),

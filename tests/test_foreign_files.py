@@ -158,7 +158,7 @@ OWN = {
     "devices.fmi.vendor_files": "is_file before it",
     "studies.added": "the code of an installed distribution",
     "studies.points.code": "our own code",
-    "studies.points.key": "check_regular before it",
+    "core.file_hashes": "check_regular before it",
     "output.report.explorer_cells": "results",
     "output.report.html.chapters.files": "results",
     "output.report.html.chapters.devices": "pictures beside a result",

@@ -11,13 +11,13 @@ from orchestrator.cases.form.given import Time, binding_path, case_values, in_se
 from orchestrator.core.asked import check_callable, names, number_in
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError
+from orchestrator.core.file_hashes import sha256_of
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.port_mapping import BoundDescription
 from orchestrator.face.api.given_recording import Recorded, open_given
 from orchestrator.face.api.methods import in_turn
 from orchestrator.studies.black_box.port import start_of, values_for
-from orchestrator.studies.points.key import sha256_of
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.limits import read_limits
 from orchestrator.studies.validation.record import PortBases

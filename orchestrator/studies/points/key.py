@@ -6,14 +6,13 @@ import json
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.case import BUILT_IN, Case, load_case
 from orchestrator.cases.form.definition import CaseDefinition
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
-from orchestrator.core.foreign_files import check_regular
+from orchestrator.core.file_hashes import sha256_of
 from orchestrator.devices.fmi.converted_component import ConvertedDescription, native
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.port_mapping import BoundDescription
@@ -93,15 +92,3 @@ def same_case(
             "and on a cluster give all machines the same files"
         )
     return replace(case, varied=varied, line_ends=line_ends) if varied | line_ends else case
-
-
-def sha256_of(path: Path) -> str:
-    check_regular(path)
-    status = path.stat()
-    return _file_hash(path, status.st_mtime_ns, status.st_size)
-
-
-@lru_cache(maxsize=1024)
-def _file_hash(path: Path, mtime_ns: int, size: int) -> str:
-    """SHA-256 of a file as it is now; the time of its last change keeps the cache from giving an older file's hash."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()

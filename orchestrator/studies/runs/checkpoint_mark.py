@@ -16,9 +16,10 @@ from fmus.toolchain.extras import installed_version
 from orchestrator.cases.form.locate import place_in
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import few
+from orchestrator.core.file_hashes import sha256_of
 from orchestrator.output.results.origin import files_named
 from orchestrator.studies.points.code import code_hash, library_versions
-from orchestrator.studies.points.key import component_content, sha256_of
+from orchestrator.studies.points.key import component_content
 
 Keys = tuple[str, ...]
 

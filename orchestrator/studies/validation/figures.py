@@ -248,8 +248,8 @@ def delay_between(
     shifts = np.arange(-most, most + 1)
     if len(times) < 4 * most:
         return None
-    inner = slice(most, len(times) - most)
-    cost = np.array([np.var(y[inner] - np.roll(x, k)[inner]) for k in shifts])
+    count = len(times) - 2 * most
+    cost = np.array([np.var(y[most:-most] - x[most - k :][:count]) for k in shifts])
     best = int(cost.argmin())
     if best in (0, len(shifts) - 1):
         return None

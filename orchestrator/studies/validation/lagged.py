@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
 
 import numpy as np
 from scipy.linalg import solve_banded
@@ -31,9 +32,16 @@ _ALIKE = (
 
 def ask_of_lag(comparison: EventComparison) -> Iterator[tuple[float, Question]]:
     """The lag of P, of Q or of both that explains most of that signal's error, with the part that it leaves."""
+    event, own = comparison.event, comparison.played.power
+    off = {name for name in ("p", "q") if _is_off(comparison, name)}
+
+    @cache
+    def errors_behind(lag: float) -> tuple[float, float]:
+        return rms_error(_behind(own, lag / event.recording.interval), event)
+
     for signals in (("p", "q"), ("p",), ("q",)):
-        if all(_is_off(comparison, one) for one in signals):
-            found = [*_explained(comparison, signals)]
+        if off.issuperset(signals):
+            found = [*_explained(comparison, signals, errors_behind)]
             yield from found
             if found:
                 return
@@ -95,23 +103,25 @@ def _is_off(comparison: EventComparison, name: str) -> bool:
 
 
 def _explained(
-    comparison: EventComparison, signals: tuple[str, ...]
+    comparison: EventComparison,
+    signals: tuple[str, ...],
+    errors_behind: Callable[[float], tuple[float, float]],
 ) -> Iterator[tuple[float, Question]]:
+    """The lag of some signals that explains most of their error; ``errors_behind``: rms errors of P and Q by lag."""
     event, own = comparison.event, comparison.played.power
     interval = event.recording.interval
 
-    def left_of(power: Complex) -> float:
-        p, q = rms_error(power, event)
-        return math.hypot(*(one for name, one in (("p", p), ("q", q)) if name in signals))
+    def together(errors: tuple[float, float]) -> float:
+        return math.hypot(*(one for name, one in zip("pq", errors, strict=True) if name in signals))
 
     def left_behind(lag: float) -> float:
-        return left_of(_behind(own, lag / interval))
+        return together(errors_behind(lag))
 
     lags = np.geomspace(*_LAGS, _COUNT)
     best = float(min(lags, key=left_behind))
     step = float(lags[1] / lags[0])
     best = float(min(best * np.geomspace(1 / step, step, 2 * _FINER + 1), key=left_behind))
-    error, left = left_of(own), left_behind(best)
+    error, left = together(rms_error(own, event)), left_behind(best)
     inside = _LAGS[0] < best < _LAGS[1] and best > 0.5 * interval
     if inside and left <= _EXPLAINS * error:
         figures = {"signals": list(signals), "lag": best, "error": error, "left": left}

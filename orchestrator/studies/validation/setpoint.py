@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -164,15 +163,18 @@ def _ramps(recording: Recording, name: str, values: Numbers, first: int) -> Iter
 def _straightest(times: Numbers, error: Numbers) -> tuple[float, Numbers, tuple[float, float]]:
     """The ramp that leaves the least of an error: the rms left, its shape from 0 to 1, begin and end [s]."""
     best = (np.inf, np.zeros_like(times), (0.0, 0.0))
-    for low, high in itertools.combinations(times, 2):
-        if low - times[0] < _BEFORE_RAMP or high - low < _SHORTEST_RAMP:
-            continue
-        shape = np.clip((times - low) / (high - low), 0.0, 1.0)
-        deviation, moved = error - error.mean(), shape - shape.mean()
-        rest = deviation - moved * float(moved @ deviation) / float(moved @ moved)
-        left = float(np.sqrt(np.mean(rest**2)))
-        if left < best[0]:
-            best = (left, shape, (low, high))
+    deviation = error - error.mean()
+    for low in times[times - times[0] >= _BEFORE_RAMP]:
+        highs = times[times - low >= _SHORTEST_RAMP]
+        if not len(highs):
+            break
+        shapes = np.clip((times - low) / (highs - low)[:, None], 0.0, 1.0)
+        moved = shapes - shapes.mean(axis=1, keepdims=True)
+        sizes = moved @ deviation / np.sum(moved**2, axis=1)
+        left = np.sqrt(np.mean((deviation - sizes[:, None] * moved) ** 2, axis=1))
+        at = int(left.argmin())
+        if left[at] < best[0]:
+            best = (float(left[at]), shapes[at], (float(low), float(highs[at])))
     return best
 
 
