@@ -71,8 +71,8 @@ class Explanation:
     error: float
     left: float
     noise: float = 0.0
-    beside: Mapping[str, float] = field(default_factory=dict)  # another number with its value
-    beside_now: Mapping[str, float] = field(default_factory=dict)  # of a pair, in the model
+    beside: Mapping[str, float | bool] = field(default_factory=dict)  # others with their values
+    beside_now: Mapping[str, float | bool] = field(default_factory=dict)  # of a pair, in the model
     outdone: bool = False  # whether another cause leaves clearly less
 
     @property
@@ -111,6 +111,12 @@ class Explanation:
         if self.cause in (CauseKind.DELAY, CauseKind.LIMIT, CauseKind.LAG):
             return {}
         return {self.name: self.value, **self.beside}
+
+    @property
+    def takes_second(self) -> bool:
+        """Return whether another cause is looked for beside it, if it leaves much: of one number, or of a switch."""
+        alone = self.cause is CauseKind.VALUE and not self.beside
+        return alone or self.cause is CauseKind.POSITION
 
     def same_as(self, other: Explanation) -> bool:
         """Return whether another cause, found on another way, is of the same parameters.

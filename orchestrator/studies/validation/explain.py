@@ -26,7 +26,7 @@ from orchestrator.studies.validation.cause_numbers import (
     numbers_by_slope,
     promises_of,
 )
-from orchestrator.studies.validation.cause_pairs import pair_of_limits, pair_of_numbers
+from orchestrator.studies.validation.cause_pairs import cause_beside, pair_of_limits
 from orchestrator.studies.validation.causes import (
     CauseKind,
     CauseSearch,
@@ -134,19 +134,20 @@ def _causes(
 ) -> Iterator[Explanation]:
     """Causes as they are found, the quickest first.
 
-    Numbers are tried far from where they are, limits at levels, and two numbers at once, only if what was found leaves
+    Numbers are tried far from where they are, limits at levels, and two causes at once, only if what was found leaves
     more than the scatter. A run that is held in step takes three times as long: there the former is done if nothing
     explains, and the last for limits alone."""
     looked_at = _looked_at(device, events)
     bench = CauseBench(device, looked_at, report)
     rough = bench if device.rough is device else CauseBench(device.rough, looked_at, report)
     told = explained = False
-    best: Explanation | None = None
+    best: Explanation | None = None  # of those with which the device can be run
 
     def seen(causes: Iterator[Explanation]) -> Iterator[Explanation]:
         nonlocal told, explained, best
         for one in causes:
-            best = one if best is None or one.left < best.left else best
+            if one.values and (best is None or one.left < best.left):
+                best = one
             explained = explained or one.explains
             told = told or (one.explains and not one.leaves_much)
             yield one
@@ -165,7 +166,7 @@ def _causes(
     if not told and best is not None:
         yield from seen(pair_of_limits(bench, rough, best))
     if not told and best is not None and not device.gives_way:
-        yield from pair_of_numbers(bench, rough, best)
+        yield from cause_beside(bench, rough, best)
 
 
 def _looked_at(device: PlayedDevice, events: Sequence[RecordedEvent]) -> list[RecordedEvent]:

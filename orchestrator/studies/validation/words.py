@@ -458,7 +458,7 @@ def explanation_sentence(
     if nothing_to_explain(explanations):
         said = _said_of_noise(explanations[0])
         return said if finished else f"Interrupted before all causes were tried. {said}"
-    said = _said_of_causes(explanations, in_step=in_step)
+    said = _said_of_causes(explanations, finished=finished, in_step=in_step)
     if in_step:
         said += f" {_HELD}"
     if plain is not None:
@@ -508,7 +508,7 @@ def _plainly(part: PlainPart) -> str:
     )
 
 
-def _said_of_causes(explanations: Sequence[Explanation], *, in_step: bool) -> str:
+def _said_of_causes(explanations: Sequence[Explanation], *, finished: bool, in_step: bool) -> str:
     if not explanations:
         return "No cause that was tried leaves less of the error."
     best = explanations[0]
@@ -524,17 +524,29 @@ def _said_of_causes(explanations: Sequence[Explanation], *, in_step: bool) -> st
         )
     are, they = ("causes are", "they explain") if best.beside_now else ("cause is", "it explains")
     said = f"The likeliest {are} {_cause(best)}: "
-    said += f"{they} {best.share:.0%} of the squared error beyond the recording's own noise."
+    said += f"{they} {best.share:.0%} of the squared error beyond the recording's own noise"
+    said += f"{_first_alone(explanations)}."
     alike = [one for one in explanations[1:] if one.name != best.name and one.explains]
     if not in_step:  # what gives way leaves something of the right value as well
-        said += _left_over(best)
+        said += _left_over(best, finished=finished)
     if alike:
         said += f" The recordings tell it hardly apart from {'; '.join(map(_cause, alike))}."
     return said
 
 
-def _left_over(best: Explanation) -> str:
-    """Say what the likeliest cause leaves, where that stands above the recording's own noise."""
+def _first_alone(explanations: Sequence[Explanation]) -> str:
+    """Say which part the first of two causes explains by itself; empty where there is one."""
+    best, *others = explanations
+    alone = next((one for one in others if one.name == best.name and one.takes_second), None)
+    if not best.beside_now or alone is None:
+        return ""
+    return f", {best.name} by itself {alone.share:.1%} and leaves {alone.left:.2g} pu (rms)"
+
+
+def _left_over(best: Explanation, *, finished: bool) -> str:
+    """Say what the likeliest cause leaves, where that stands above the recording's own noise.
+
+    ``finished``: whether a second one was looked for."""
     left = f" {best.left:.2g} pu (rms) are left"
     if best.leaves_much:
         times = f", {_times_noise(best)}" if best.noise > 0 else ""
@@ -542,7 +554,7 @@ def _left_over(best: Explanation) -> str:
             f"{left}{times}: something else may be off as well, and its part is in this value; "
             + Option.FIT
             + " finds several values together."
-            + _second_cause(best)
+            + (_no_second(best) if finished and best.takes_second else _second_cause(best))
         )
     if best.leaves_some:
         return f"{left}, {_times_noise(best)}, as samples and steps make as well." + _second_cause(
@@ -555,10 +567,23 @@ def _times_noise(one: Explanation) -> str:
     return f"{one.left / one.noise:.0f} times the recording's own noise"
 
 
+def _no_second(one: Explanation) -> str:
+    """Say that no cause was found beside the first, and what tries all of them there."""
+    return (
+        f" No second number or switch beside it explains most of that; {_options_of(one)} {Option.EXPLAIN} tries all "
+        "causes from there."
+    )
+
+
 def _second_cause(one: Explanation) -> str:
     """Say how another cause beside the first is looked for; empty where that is no value of a parameter."""
-    given = " ".join(f"{Option.SET} {name}={value_text(x)}" for name, x in one.values.items())
+    given = _options_of(one)
     return f" A second cause is looked for with {given} {Option.EXPLAIN}." if given else ""
+
+
+def _options_of(one: Explanation) -> str:
+    """The options with which a device has a cause; empty where that is no value of a parameter."""
+    return " ".join(f"{Option.SET} {name}={value_text(x)}" for name, x in one.values.items())
 
 
 def _cause(one: Explanation) -> str:

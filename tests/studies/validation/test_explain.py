@@ -1,6 +1,7 @@
 """A fault that is planted in the plant and not in its model is named, with its size, from the recording alone."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ from orchestrator.studies.validation.lagged import lag_alone
 from orchestrator.studies.validation.parameters import Adjustable
 from orchestrator.studies.validation.questions import QuestionKind
 from orchestrator.studies.validation.words import explanation_sentence, sentence
-from tests.studies.validation.recordings import run, table, with_noise
+from tests.benchmarks.validation_draws import TRUTH
+from tests.studies.validation.recordings import EVENT, run, table, with_noise
 from tests.support.late import LateLibrary
 
 scipy_signal = LateLibrary("scipy.signal")
@@ -23,6 +25,14 @@ STEP = "500 us"
 
 FINE = "200 us"
 """Where a limit, a lag or the noise decides what is found."""
+
+
+@cache
+def phasor_plant():
+    """A plant of phasors whose POD-P has a gain of 120."""
+    solver = {"step_size": "100 us", "record_interval": "1 ms", "record_filter": "low-pass"}
+    case = gfor_in_python.load("two_area_rms").with_(events=[EVENT], solver=solver)
+    return table(case.scenario("pod_p", {"gfor.pod_p.K": 120.0}).run(stop=3.0).dataset)
 
 
 def explained(frame, device="gfor", **more):
@@ -83,6 +93,22 @@ def test_two_numbers_that_are_off_at_once_are_named_together_and_one_alone(also)
     assert [one.name for one in others if one.cause is CauseKind.PAIR] == []
     said = explanation_sentence(causes)
     assert ("together with droop.R_f" in said) == bool(also)
+
+
+@pytest.mark.parametrize("also", [{"droop.R_V": 0.045}, {"droop.R_f": 0.04}, {}])
+def test_a_number_beside_a_switch_that_is_off_is_named_and_none_where_the_switch_is_all(also):
+    """Phasors: the plant has POD-P on with a gain of 120."""
+    causes = explained(with_noise(phasor_plant()), "gfor_phasor", values=also, step="1 ms")
+    best, *others = causes
+    assert (best.name, best.now, best.value) == ("pod_p.enabled", False, True)
+    truth = {"pod_p.K": 120.0} | {name: TRUTH[name] for name in also}
+    assert best.beside == pytest.approx(truth, rel=0.01)
+    assert (best.cause is CauseKind.PAIR) == bool(also)
+    assert not best.leaves_much
+    assert not any(one.explains and one.beside != best.beside for one in others)
+    said = explanation_sentence(causes)
+    assert all(f"together with {name}" in said for name in also)
+    assert ("pod_p.enabled by itself" in said) == bool(also)
 
 
 class TwoValleys:
@@ -283,7 +309,9 @@ def test_a_rest_above_the_scatter_is_told_with_what_looks_for_a_second_cause():
     assert said.endswith("A second cause is looked for with --set pod_p.K=139.6 --explain.")
     much = explanation_sentence([replace(gain, left=0.004)])
     assert "something else may be off" in much
+    assert "No second number or switch beside it explains most of that" in much
     assert "--set pod_p.K=139.6 --explain" in much
+    assert "No second" not in explanation_sentence([replace(gain, left=0.004)], finished=False)
     assert "second cause" not in explanation_sentence([replace(gain, left=0.0005)])
     late = replace(gain, cause=CauseKind.DELAY, name="delay of the whole response", value=0.03)
     assert "second cause" not in explanation_sentence([late])
