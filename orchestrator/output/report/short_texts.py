@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 Told = TypeVar("Told")
 _FIGURE = re.compile(r"\boutages[ =]\S+\+\S+|[-+]?\b\d[\d.,]*(?:e[-+]?\d+)?")
 """A figure, or an outage of several elements as it is typed."""
+_NEXT_SENTENCE = re.compile(r"\. (?=[A-Z])")
 LONGEST_REMARK = 120
 """Characters of a remark in a table; JSON and Python have the whole text."""
 
@@ -31,6 +32,11 @@ def kinds_of(said: Iterable[tuple[Told, Iterable[str]]]) -> list[tuple[str, list
 def short(text: str, longest: int) -> str:
     """A remark, cut at a word where it has more characters."""
     return text if len(text) <= longest else f"{text[: longest - 1].rsplit(' ', 1)[0]} …"
+
+
+def first_sentence(text: str) -> str:
+    """A text up to the full stop that a capital letter follows; the whole text where none is."""
+    return _NEXT_SENTENCE.split(text, maxsplit=1)[0]
 
 
 def share_text(entry: tuple[str, float]) -> str:

@@ -60,7 +60,12 @@ SCREENING = {
         }
     ],
     "failures": [
-        {"point": "mon", "outage": "sg3", "status": "no power flow", "why": "sg5 would need 129 %"}
+        {
+            "point": "mon",
+            "outage": "sg3",
+            "status": "no power flow",
+            "why": "sg5 would need 129 %. Let other units share it",
+        }
     ],
 }
 CHECK = {

@@ -23,6 +23,7 @@ from orchestrator.output.report.html.chapters.chapter import (
 from orchestrator.output.report.html.charts import bar_chart
 from orchestrator.output.report.html.elements import VERDICTS, table
 from orchestrator.output.report.html.least_damped import LeastDamped
+from orchestrator.output.report.short_texts import first_sentence
 
 _SHOWN = 4
 """Parameters that an answer names and a picture shows: the strongest ones."""
@@ -44,7 +45,10 @@ def of_screening(file: Path, c: Content) -> Chapter:
             f"{'' if c['points'] == 1 else worst['point'] + ', '}outage {worst['outage']}"
         )
     lost = [c["beyond_rating"]] if c.get("beyond_rating") else []
-    lost += [f"{f['point']}, {f['outage']}: {f['status']}: {f['why']}" for f in c["failures"]]
+    for failure in c["failures"]:
+        point = "" if c["points"] == 1 else f"{failure['point']}, "
+        why = f"{failure['status']}: {first_sentence(failure['why'])}"
+        lost.append(f"{point}{failure['outage']}: {why}")
     if not c.get("complete", True):
         lost.append("the cases that were not computed yet")
     computed = int(c["items"]) - len(c["failures"])
