@@ -21,7 +21,7 @@ from orchestrator.linear.models.state_space import StateSpace
 from orchestrator.linear.models.state_space import read_linear_model as read_state_space
 from orchestrator.linear.models.steady_state import OperatingPoint
 from orchestrator.linear.spectra.stability import Stability
-from orchestrator.output.report.notebook import page
+from orchestrator.output.report.notebook import headline, page
 
 _MATRICES = ("A", "B", "C", "D")
 
@@ -171,7 +171,8 @@ class LinearSystem(KnownNames, StateSpace):
         return f"<LinearSystem: {kind}, {size}>"
 
     def _repr_html_(self) -> str:
-        lines = [self.stability.sentence(), *(f"warning: {text}" for text in self.warnings)]
+        top = headline(self.stability.sentence(), self.stability.stable)
+        lines = [f"warning: {text}" for text in self.warnings]
         lines += [f"inputs: {', '.join(self.inputs)}", f"outputs: {', '.join(self.outputs)}"]
         if self.states:
             lines.append("table('A') … table('D') have the matrices, eigenvalues of A the modes")
@@ -180,7 +181,7 @@ class LinearSystem(KnownNames, StateSpace):
             "B by input and C by output, a row for each state; below, D, outputs by inputs"
         )
         below = self.table("D").to_html() if self.outputs and self.inputs else ""
-        return page(repr(self).strip("<>"), lines, b.join(c), rest=below)
+        return page(repr(self).strip("<>"), lines, b.join(c), rest=below, verdict=top)
 
 
 def read_linear_model(fmu: str | Path) -> LinearSystem:

@@ -462,7 +462,7 @@ class Run(NoTruth):
         return f"<{what}; {self.verdict}{failed}>"
 
     def _repr_html_(self) -> str:
-        lines = [self.verdict, f"modes before the events: {self.modes.stability.sentence()}"]
+        lines = [f"modes before the events: {self.modes.stability.sentence()}"]
         lines += [f"ended early: {self.failure}"] if self.failure else []
         lines += [f"found: {finding.message}" for finding in self.findings]
         prepared = self.result.modes.prepared
@@ -470,4 +470,5 @@ class Run(NoTruth):
             f"Run of {prepared.case.name}: {prepared.title}",
             lines,
             rest=str(self.dataset._repr_html_()),
+            verdict=headline(self.verdict, self.stable),
         )

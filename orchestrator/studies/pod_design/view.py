@@ -16,7 +16,7 @@ from orchestrator.core.safe_files import write_text
 from orchestrator.core.spelling import spelled
 from orchestrator.core.truth import NoTruth
 from orchestrator.linear.spectra.modes import Mode, damping_percent, damping_ratio
-from orchestrator.output.report.notebook import page
+from orchestrator.output.report.notebook import headline, page
 from orchestrator.output.results.file_writers import save_json
 from orchestrator.output.results.manifest import made_now
 from orchestrator.studies.pod_design.closed_loop import Placed, PodSetting
@@ -114,13 +114,11 @@ class ControllerDesign(NoTruth, ask=".met"):
     def _repr_html_(self) -> str:
         setting = [f"{name} = {value}" for name, value in self.parameters.items()]
         lines = [
-            self.verdict,
             self.result.stability.sentence(),
             *(f"warning: {text}" for text in self.warnings),
         ]
-        return page(
-            repr(self).strip("<>").partition(": the")[0], [*lines, ", ".join(setting)], self.table()
-        )
+        title, top = repr(self).strip("<>").partition(": the")[0], headline(self.verdict, self.met)
+        return page(title, [*lines, ", ".join(setting)], self.table(), verdict=top)
 
 
 def parameter_file_path(given: str | Path, argument: str = "path") -> Path:

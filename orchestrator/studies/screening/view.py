@@ -30,7 +30,7 @@ from orchestrator.output.report.html.charts import (
 )
 from orchestrator.output.report.html.elements import SHADES, Figures, document
 from orchestrator.output.report.mode_tables import LEAST_DAMPING, damping, eigenvalue_text
-from orchestrator.output.report.notebook import page
+from orchestrator.output.report.notebook import headline, page
 from orchestrator.output.report.short_texts import kinds_of
 from orchestrator.output.results.file_writers import save_json
 from orchestrator.output.results.mode_json import eigenvalue_json
@@ -140,9 +140,10 @@ class Screening(NoTruth):
         return f"<{head}; all points stand in items(), the worst of each outage in table()>"
 
     def _repr_html_(self) -> str:
-        told = (self.verdict, *_lines_behind(self.summary), what_was_counted(self.summary))
-        lines = [*told, "items() has all points"]
-        return page(f"Screening of {self.result.plan.case.name}", lines, self.modes())
+        told = (*_lines_behind(self.summary), what_was_counted(self.summary))
+        title = f"Screening of {self.result.plan.case.name}"
+        top = headline(self.verdict, self.stable)
+        return page(title, [*told, "items() has all points"], self.modes(), verdict=top)
 
 
 def items_table(summary: Summary) -> ColumnTable[ScreenedItem]:

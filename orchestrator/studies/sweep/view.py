@@ -11,7 +11,7 @@ from orchestrator.core.safe_files import made_folder
 from orchestrator.core.spelling import spelled
 from orchestrator.core.truth import NoTruth
 from orchestrator.output.report.explorer_cells import CELLS, Cell, CellLine, Cells
-from orchestrator.output.report.notebook import Axes, axes_or_new, page
+from orchestrator.output.report.notebook import Axes, axes_or_new, headline, page
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.output.results.staging import new_run_id, staged
 from orchestrator.studies.sweep.dataset import Samples, save_sweep, sweep_dataset, sweep_json
@@ -194,7 +194,8 @@ class ParameterSweep(NoTruth):
             None: "stability not known",
         }
         lines = [
-            self._points(),
             *(f"{s.prepared.title}: {words[s.stable]}" for s in self.result.scenarios),
+            self._points(),
         ]
-        return page(repr(self).strip("<>").partition(":")[0], lines, self.table())
+        title, top = repr(self).strip("<>").partition(":")[0], words[self.stable]
+        return page(title, lines, self.table(), verdict=headline(top, self.stable))

@@ -3,6 +3,7 @@
 import copy
 import json
 import pickle
+from html import escape
 
 import matplotlib as mpl
 import numpy as np
@@ -128,7 +129,7 @@ def test_a_sweep_is_that_of_the_command(gfor, tmp_path, two_area):
     assert written[1].read_bytes() == (tmp_path / "sweep.csv").read_bytes()
     assert sweep.failures().empty
     assert isinstance(sweep.plot(), Axes)
-    assert "stable at all points" in sweep._repr_html_()
+    assert "stable at all points" in sweep._repr_html_().partition("</b>")[0]
     assert f"<b>{repr(sweep)[1:].partition(':')[0]}" in sweep._repr_html_()
 
 
@@ -178,7 +179,7 @@ def test_a_design_is_that_of_the_command(gfor, tmp_path, two_area):
         "the sensitivity asks for K = 18.45 pu, and the bounds allow no less than 200 pu "
         "(both on the base S_n of the converter): gain_bounds 0" in design.verdict
     )
-    assert design.verdict in design._repr_html_()
+    assert design.verdict in design._repr_html_().partition("</b>")[0]
     assert design.table().loc["with it", "damping_percent"] > 20
 
 
@@ -382,7 +383,10 @@ def test_results_show_themselves(modes, run, two_area):
     assert "electromechanical" in modes._repr_html_()
     linear = scenario.linearize()
     assert f"<th>{linear.outputs[0]}</th>" in linear._repr_html_()  # D by name, not all of A
-    assert f"<b>{repr(linear)[1:-1]}" in linear._repr_html_()
+    for shown, verdict in ((linear, linear.stability.sentence()), (run, run.verdict)):
+        top, _, below = shown._repr_html_().partition("</b>")
+        assert top.endswith(f"<b>{escape(verdict)}")
+        assert f"<b>{repr(shown)[1:4]}" in below  # the title comes behind it
 
 
 def test_what_is_shown_cannot_be_read_as_html(two_area):
