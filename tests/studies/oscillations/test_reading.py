@@ -113,6 +113,10 @@ def test_units_that_the_case_contradicts_are_asked_about(gfor, tmp_path, measure
     assert "0.1 degrees in the record and to 5.74 in the case" in asked
 
 
+def test_a_whole_record_has_no_remark(tmp_path, measured):
+    assert not source(csv(tmp_path / "pmu.csv", measured)).remarks
+
+
 @pytest.mark.parametrize(
     ("old", "new", "remarks"),
     [
@@ -145,9 +149,8 @@ def test_units_that_the_case_contradicts_are_asked_about(gfor, tmp_path, measure
     ],
 )
 def test_a_column_that_is_not_used_is_named(tmp_path, measured, old, new, remarks):
-    """A whole record has no such remark; without one signal a place is not there, and that is said."""
+    """Without one signal a place is not there, and that is said."""
     path = csv(tmp_path / "pmu.csv", measured)
-    assert not source(path).remarks
     path.write_text(path.read_text().replace(f",{old} [", f",{new} [", 1))
     found = source(path)
     assert "sg1" not in found.places

@@ -56,10 +56,15 @@ def wscc():
     return net
 
 
+@pytest.fixture(scope="module")
+def wscc_voltages():
+    return pandapowers(wscc())
+
+
 @pytest.mark.parametrize(
     ("revision", "named"), [(33, True), (33, False), (34, True), (35, False), (36, True)]
 )
-def test_the_voltages_are_pandapowers_in_every_revision(revision, named, written):
+def test_the_voltages_are_pandapowers_in_every_revision(revision, named, written, wscc_voltages):
     data = written(raw(revision, named=named))
     assert (data.frequency, data.slack, data.changes) == (60.0, "bus_1", ())
     assert {bus: g.rating_mva for bus, g in data.generation.items()} == {
@@ -67,10 +72,9 @@ def test_the_voltages_are_pandapowers_in_every_revision(revision, named, written
         "bus_2": 192.0,
         "bus_3": 128.0,
     }
-    wanted = pandapowers(wscc())
     flow = solved(data)
     for bus, v in flow.voltages.items():
-        assert v == pytest.approx(wanted[bus], abs=1e-8)
+        assert v == pytest.approx(wscc_voltages[bus], abs=1e-8)
 
 
 def test_the_textbooks_voltages(written):
