@@ -90,9 +90,15 @@ def _reason(error: ToolError) -> str:
     """Return why a verb refused, without the words that the library puts before it."""
     cause = error.__cause__
     if isinstance(cause, ValidationError):
-        found = (f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in cause.errors())
-        return "; ".join(found)
+        return "; ".join(dict.fromkeys(_fault(one["loc"], one["msg"]) for one in cause.errors()))
     return str(cause if isinstance(cause, ToolError) else error)
+
+
+def _fault(place: tuple[int | str, ...], message: str) -> str:
+    """Return one fault in words; of a value that no type fits, the library tells of each type."""
+    if place[0] == "values" and len(place) > 2:
+        return f"values.{place[1]}: give a finite number, true or false, or a text such as '200 MW'"
+    return f"{'.'.join(map(str, place))}: {message}"
 
 
 def _with_errors(verb: Callable[_P, _R]) -> Callable[_P, _R]:

@@ -7,10 +7,12 @@ import jsonschema
 import pytest
 
 import orchestrator as gfor
+from orchestrator.face.agents.question import Allowance
 from tests.support.late import LateLibrary
 
 mcp, streams = LateLibrary("mcp"), LateLibrary("mcp.client.stdio")
 owner = LateLibrary("orchestrator.face.agents.server")  # which imports mcp
+exceptions = LateLibrary("mcp.server.mcpserver.exceptions")
 
 VERBS = {
     "cases",
@@ -143,3 +145,14 @@ def test_every_refusal_begins_with_its_verb_and_repeats_no_value(answers):
     ]
     assert told[-2] == "scr: case: Input should be a valid string"
     assert told[-1].endswith("there are: " + ", ".join(owner.VERBS))
+
+
+@pytest.mark.parametrize("value", [None, [1.0]])
+def test_a_value_that_is_none_is_refused_in_one_sentence(tmp_path, value):
+    server = owner.make_server(Allowance((tmp_path,), tmp_path / "results", 1.0))
+    given = {"case": "two_area", "values": {"gfor.pod_p.K": value}}
+    with pytest.raises(
+        exceptions.ToolError,
+        match=r"^modes: values\.gfor\.pod_p\.K: give a finite number, true or false, or a text such as '200 MW'$",
+    ):
+        anyio.run(server.call_tool, "modes", given)
