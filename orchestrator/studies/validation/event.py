@@ -37,7 +37,7 @@ from orchestrator.studies.validation.ring_gaps import ask_of_gaps
 from orchestrator.studies.validation.second_event import second_event
 from orchestrator.studies.validation.setpoint import ask_of_setpoint, without_step
 from orchestrator.studies.validation.smoothed import ask_of_smoothing
-from orchestrator.studies.validation.trend import trend_of
+from orchestrator.studies.validation.trend import PARTS_OF_TREND, trend_of
 from orchestrator.studies.validation.windows import Windows, find_windows
 
 _SHORTEST_BEFORE = 0.1  # a window before the event [s] that shows a steady state
@@ -212,7 +212,7 @@ def _of_windows(recording: Recording, windows: Windows, before: Mask) -> list[Qu
         found.append(Question(QuestionKind.SHORT_BEFORE, {"length": windows.begin}))
     elif windows.seen:
         moves = trend_of(recording.power[before])
-        if moves > _MOVES_BEFORE or _swings_before(recording, windows, before, moves):
+        if moves > _least_movement(recording, windows, before):
             found.append(Question(QuestionKind.NO_STEADY_STATE, {"moves": moves}))
     return found + _gaps(recording, windows)
 
@@ -271,23 +271,27 @@ def _slow_samples(comparison: EventComparison) -> list[Question]:
     return [Question(QuestionKind.SLOW_SAMPLES, figures)]
 
 
-def _swings_before(recording: Recording, windows: Windows, before: Mask, moves: float) -> bool:
-    """Return whether the movement before the event is much of that after it, as in a record that begins in a swing."""
-    after = windows.part("after", recording.times)
-    during = windows.part("during", recording.times)
-    most = trend_of(recording.power[after | during])
-    count = max(1, int(before.sum()) // 10)
-    return moves > max(_LEAST_BEFORE, _PART_BEFORE * most) and moves > _SCATTERS * _scatter(
-        recording, before
-    ) / np.sqrt(count)
+def _least_movement(recording: Recording, windows: Windows, before: Mask) -> float:
+    """The movement before an event from which on there is no steady state [pu].
+
+    It is more than noise makes, and some of what follows, as in a record that begins in a swing."""
+    following = windows.part("after", recording.times) | windows.part("during", recording.times)
+    part = _PART_BEFORE * trend_of(recording.power[following])
+    least = min(_MOVES_BEFORE, max(_LEAST_BEFORE, part))
+    return max(least, _SCATTERS * _scatter(recording, before))
 
 
 def _scatter(recording: Recording, before: Mask) -> float:
-    """How far P or Q scatters from sample to sample [pu]."""
-    changes = np.diff(recording.power[before])
+    """How far the means that tell the movement before an event scatter by noise [pu].
+
+    Samples within the time over which the power is averaged hold the same noise."""
+    lag = max(1, round(recording.average / recording.interval))
+    power = recording.power[before]
+    changes = power[lag:] - power[:-lag]
     if not len(changes):
         return 0.0
-    return float(max(np.std(changes.real), np.std(changes.imag)) / np.sqrt(2))
+    independent = max(1.0, len(power) / PARTS_OF_TREND / lag)
+    return float(max(np.std(changes.real), np.std(changes.imag)) / np.sqrt(2 * independent))
 
 
 def compare_with(device: PlayedDevice, event: RecordedEvent) -> EventComparison:

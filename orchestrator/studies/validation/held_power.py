@@ -1,4 +1,4 @@
-"""P or Q that a recorder stores every so often, or only where it has changed by enough, and holds in between."""
+"""P, Q or a magnitude that a recorder stores every so often, or where it has changed, and holds in between."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 from orchestrator.core.arrays import Numbers
 from orchestrator.studies.validation.filled import runs_of
 
-_SHORTEST = 0.04  # [s] of a hold: a shorter one is lost in the mean over a period
+_SHORTEST = 0.008
+"""Of a hold [s]: the channel is late by half of it, and clocks that are 4 ms apart are asked about as well."""
 _FEWEST_REPEATS = 3  # samples in a row that repeat the one before
 _FEWEST_HOLDS = 5  # a plant whose setpoint is stepped by hand stands still less often
 _HELD = 0.5  # part of the samples, between the first change and the last, that is held

@@ -16,6 +16,7 @@ class QuestionKind(StrEnum):
     ANGLE_UNIT = "angle unit"
     ANGLE_HELD = "angle held"
     POWER_HELD = "power held"
+    MAGNITUDE_HELD = "magnitude held"
     SMOOTHED = "smoothed"
     ANGLE_AND_FREQUENCY = "angle and frequency differ"
     FREQUENCY_ALONE = "frequency alone"

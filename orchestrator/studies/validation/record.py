@@ -293,10 +293,11 @@ class _Reading:
                 self.ask(QuestionKind.STUCK, value=float(self.dataset[column][known][0]), **figures)
             if role == "v" and _scatters(value):
                 self._ask_of_still_angle()
-            held = held_power(times, value) if role in ("p", "q") else None
+            held = None if role == "v" and not _scatters(value) else held_power(times, value)
             if held is not None:
+                kind = QuestionKind.MAGNITUDE_HELD if role == "v" else QuestionKind.POWER_HELD
                 figures = {"role": role, "column": column, "count": held.count}
-                self.ask(QuestionKind.POWER_HELD, usual=held.usual, longest=held.longest, **figures)
+                self.ask(kind, usual=held.usual, longest=held.longest, **figures)
             own = known & ~self.held[role] if role in self.held else known
             moved, when = values[own], self.times[own]
             run = clipped_run(moved) if role in ("p", "q") else None

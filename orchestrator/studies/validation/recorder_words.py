@@ -356,6 +356,7 @@ RECORDER_SENTENCES: Mapping[QuestionKind, Sentence] = {
     QuestionKind.STORED_TWICE: _stored_twice,
     QuestionKind.STUCK: _stuck,
     QuestionKind.POWER_HELD: _power_held,
+    QuestionKind.MAGNITUDE_HELD: _power_held,
     QuestionKind.SMOOTHED: _smoothed_event,
     QuestionKind.SPIKE: _spike,
     QuestionKind.CLIPPED: _clipped,

@@ -33,6 +33,7 @@ _SLOW = (0.1, 0.3)  # times [s] over which a signal bends in an event that is no
 _SMOOTHED = 0.25  # part of such a time over which means are taken first
 _GROWS = 2  # lags that pass from a slow event's begin until its change is abrupt
 _BENDS_BEFORE = 0.5  # time [s] before the earliest begin that shows a straight line
+_WANDERS = 5.0  # times the change that counts as an event, to which an angle may wander before one
 _CANDIDATES = 100  # begins that are compared, and three times as many samples
 _LASTS = 0.3  # part of the largest change over the lag, from which on a change is still the event
 _CORNERS = (0.04, 0.1)
@@ -139,11 +140,38 @@ def _event(recording: Recording, still: Complex, first: int) -> Windows | None:
         return None
     change = _changes(still, lag)
     usual = float(change[: max(1, first - lag)].max())
-    abrupt = np.flatnonzero(change > max(_ABOVE * usual, _least_change(change)))
+    threshold = max(_ABOVE * usual, _least_change(change))
+    abrupt = np.flatnonzero(change > threshold)
+    back = round(_BACK / recording.interval)
+    kink = _kink(still, lag, first)
+    wanders = _scatter(still[: max(first, (kink or 0) - back)]) > usual
+    if kink is not None and wanders and not _began_before(change, kink - lag, threshold):
+        return _windows_from(recording, still, kink)
     if not len(abrupt):
         return None
-    earliest = max(0, int(abrupt[0]) + lag - round(_BACK / recording.interval))
+    earliest = max(0, int(abrupt[0]) + lag - back)
     return _windows_of(recording, still, earliest, int(abrupt[0]) + lag, usual)
+
+
+def _kink(still: Complex, lag: int, first: int) -> int | None:
+    """The last sample before a signal leaves abruptly the line on which it was; None where it never does.
+
+    An angle that wanders with its grid's frequency moves by more in a period than a load's step moves it, but keeps
+    its line."""
+    off = np.zeros(len(still) - lag)
+    off[lag:] = np.abs(still[2 * lag :] - 2 * still[lag:-lag] + still[: -2 * lag])
+    usual = float(off[: max(1, first - lag)].max())
+    seen = np.flatnonzero(off > max(_ABOVE * usual, _least_change(off)))
+    if not len(seen):
+        return None
+    at = int(seen[0])
+    as_before = np.flatnonzero(off[: at + 1] <= max(_AS_USUAL * usual, _LASTS * off[at]))
+    return int(as_before[-1]) + lag if len(as_before) else None
+
+
+def _began_before(change: Numbers, kink: int, threshold: float) -> bool:
+    """Return whether changes that end before a kink are too large for a wandering angle: a slow event began there."""
+    return float(change[: max(kink, 0)].max(initial=0.0)) > _WANDERS * threshold
 
 
 def _least_change(change: Numbers) -> float:

@@ -160,3 +160,17 @@ def test_a_dip_begins_where_it_does_though_the_angle_wanders(seed, interval, her
     found = windows(voltage, interval, length=12.0)
     assert found.seen
     assert found.begin == pytest.approx(3.0, abs=1.1 * interval)
+
+
+@pytest.mark.parametrize("interval", [1e-3, 0.02])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_small_step_is_the_event_though_the_angle_wanders_by_as_much_in_a_period(seed, interval):
+    """The frequency wanders by 20 mHz with a correlation of 2 s, as that of a grid without an event."""
+
+    def voltage(times):
+        angle = wandering(times, seed, hertz=0.02, corner=0.08)
+        return (1 - 0.006 * (times >= 5.0 - 1e-9)) * np.exp(1j * angle)
+
+    found = windows(voltage, interval, length=12.0)
+    assert found.seen
+    assert found.begin == pytest.approx(5.0, abs=1.1 * interval)

@@ -53,5 +53,10 @@ def test_a_plant_at_rest_is_not_held():
     assert held_power(TIMES, ring_down()) is None
 
 
-def test_a_hold_within_a_period_is_lost_in_its_mean():
-    assert held_power(TIMES, np.repeat(ring_down()[::4], 4)) is None
+@pytest.mark.parametrize(("samples", "is_held"), [(15, True), (8, False)])
+def test_a_hold_is_asked_about_from_the_delay_on_that_clocks_are(samples, is_held):
+    """Samples 1 ms apart: a power is late by half a hold in the mean."""
+    times = np.linspace(TIMES[0], TIMES[-1], 5 * len(TIMES))
+    dense = np.interp(times, TIMES, ring_down())
+    found = held_power(times, np.repeat(dense[::samples], samples)[: len(times)])
+    assert (found is not None) is is_held

@@ -229,6 +229,11 @@ PLANTED = {
     ),
     "held": (held, "angle held"),
     "P is stored every 0.1 s": (held_power, "power held"),
+    "P is stored every 15 ms": (lambda f: held_power(f, 15), "power held"),
+    "the magnitude is stored every 0.1 s": (
+        lambda f: f.assign(v_pu=f.v_pu.to_numpy()[np.arange(len(f)) // 100 * 100]),
+        "magnitude held",
+    ),
     "the frequency turns the other way": (
         lambda f: of_frequency(f, -1),
         "angle and frequency differ",
