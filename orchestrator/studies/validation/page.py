@@ -10,6 +10,7 @@ from orchestrator.output.report.colours import colour
 from orchestrator.output.report.html.charts import ChartCurve, legend, line_chart, thinned
 from orchestrator.output.report.html.elements import Figures, bullet_list, document, table
 from orchestrator.studies.validation.causes import nothing_to_explain
+from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import EventComparison
 from orchestrator.studies.validation.figures import SIGNALS
 from orchestrator.studies.validation.lasting import lasting_errors
@@ -72,7 +73,8 @@ def validation_page(result: ValidationResult) -> str:
         lasting = lasting_sentence(lasting_errors(of_both), explained=result.request.explain)
         says += [f"{lasting[0].upper()}{lasting[1:]}."] if lasting else []
     places = [one for one in result.apart if one.more_than_from_record]
-    says += [difference_sentence(places)] if places else []
+    if places:
+        says.insert(0, difference_sentence(places))
     says += [_causes_said(result)] if result.request.explain else []
     listed_says = "".join(f"<li>{escape(one)}</li>" for one in says)
     findings = f'<div class="findings"><ul>{listed_says}</ul></div>'
@@ -80,7 +82,10 @@ def validation_page(result: ValidationResult) -> str:
 
 
 def _model(result: ValidationResult) -> str:
-    device = result.request.device
+    return "".join(map(_model_table, result.devices))
+
+
+def _model_table(device: PlayedDevice) -> str:
     rows = [
         ["File", escape(device.path.name)],
         ["SHA-256", file_hash(device.path) or ""],
@@ -89,7 +94,7 @@ def _model(result: ValidationResult) -> str:
         ["Communication step", f"{1e6 * device.step_size:g} µs"],
     ]
     rows += [[escape(name), escape(str(value))] for name, value in device.values.items()]
-    return table("The model and the values that it was given", ["", ""], rows, left=2)
+    return table(f"{device.name} and the values that it was given", ["", ""], rows, left=2)
 
 
 def _event(one: EventComparison, figures: Figures, others: Sequence[EventComparison]) -> str:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import orchestrator as gfor_in_python
 from orchestrator.studies.validation.beside import models_apart
 from orchestrator.studies.validation.limits import EXAMPLE
+from orchestrator.studies.validation.page import _model
 from orchestrator.studies.validation.view import Validation, parts
 from orchestrator.studies.validation.words import difference_sentence
 from tests.studies.validation.recordings import run, table, with_noise, written
@@ -69,3 +70,6 @@ def test_the_first_line_names_the_model_with_the_larger_error():
     (first,) = map(str, said)
     assert first.startswith("wrong: the largest error")
     assert f"{wrong.comparisons[0].largest_error[2].max_error:.3g} pu" in first
+    both = _model(replace(right, request=replace(right.request, beside=named[0])))
+    assert "wrong and the values that it was given" in both
+    assert both.index("120.0") < both.index("180.0")
