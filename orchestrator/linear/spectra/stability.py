@@ -157,6 +157,8 @@ class Stability(NoTruth):
         The machines' speeds where what grows fastest is the drift of all of them alike; none otherwise.
     of_zeros
         States that take part most where several eigenvalues are zero; none where no component gives derivatives.
+    hidden_by_step
+        The communication step [s] with which nothing grows, though the system grows without one; None elsewhere.
 
     Examples
     --------
@@ -181,6 +183,7 @@ class Stability(NoTruth):
     reason: str = ""  # why the verdict is not known, or the region that was not searched
     common_speed: tuple[str, ...] = ()  # the machines' speeds where they drift alike
     of_zeros: tuple[str, ...] = ()  # states that take part most in several zeros
+    hidden_by_step: float | None = None  # step [s] with which nothing grows, though the system does
 
     @property
     def only_common_speed(self) -> bool:
@@ -386,6 +389,7 @@ def judge(
         return replace(
             continuous,
             continuous_growth_rate=rate,
+            hidden_by_step=model.step_size,
             reason="; ".join(t for t in (own.reason, text) if t),
         )
     return replace(own, continuous_growth_rate=rate)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from orchestrator.linear.spectra.modes import Mode
-from orchestrator.linear.spectra.stability import Cause
+from orchestrator.linear.spectra.stability import Cause, Stability
 from orchestrator.output.report.short_texts import first_few
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.runs.answer import ScenarioAnswer
@@ -56,12 +56,20 @@ def _remark(result: ModesResult, mode: Mode | None) -> str:
     place = _outside(result, verdict.mode)
     who = _who_grows(result, verdict.mode) if place else ""
     because = "; cause: the coupling" if verdict.cause is Cause.COUPLING else ""
-    grows = f"grows at {verdict.mode.eigenvalue.real:+.3g} 1/s{place}{who}{because}"
+    grows = f"grows at {verdict.mode.eigenvalue.real:+.3g} 1/s{place}{who}{because}{_hidden(verdict)}"
     if swing and not place:
         return f"{grows}; {swing}"
     if mode is not None and mode.eigenvalue.real > 0:
         return f"{grows}; the mode at {mode.frequency_hz:.3f} Hz grows as well: {swing}"
     return grows
+
+
+def _hidden(verdict: Stability) -> str:
+    """Say that the damping in the row, which is with the communication step, hides the growth; "" if it does not."""
+    step = verdict.hidden_by_step
+    if step is None:
+        return ""
+    return f" without a communication step; a step of {step:g} s, as in this row's damping, hides it"
 
 
 def _who_grows(result: ModesResult, growing: Mode) -> str:

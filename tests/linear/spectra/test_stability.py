@@ -161,6 +161,7 @@ def test_what_the_step_hides_is_said():
     assert verdict.stable is False
     assert verdict.largest_growth_rate == pytest.approx(0.3)
     assert "hides it: nothing grows in the step map, at most -0.01 1/s" in verdict.sentence()
+    assert verdict.hidden_by_step == STEP
 
 
 def test_modes_outside_a_range_are_counted_and_real_poles_are_none():

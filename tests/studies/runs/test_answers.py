@@ -76,6 +76,18 @@ def result(findings=(), stable=True, events=(1.0,), failure=None, kind=None, sto
     return RunResult(modes, None, findings=list(findings), failure=failure)
 
 
+def test_a_growth_that_the_step_hides_is_told_beside_the_damping_that_hides_it():
+    """In a row, a positive damping and the word UNSTABLE contradict each other without a reason."""
+    modes = result().modes
+    growing = make_mode(0.01 + 5j, np.ones(2) / 2, np.ones(2), SPEEDS)
+    modes.stability = Stability(False, growing, hidden_by_step=1e-4)
+    answer = of_modes(modes)
+    assert answer.mode.damping_percent > 0
+    assert "without a communication step; a step of 0.0001 s" in answer.remark
+    modes.stability = Stability(False, growing)
+    assert "step" not in of_modes(modes).remark
+
+
 def finding(kind, **more):
     return Finding(kind, 1.0, "gfor", "x", "message", **more)
 
