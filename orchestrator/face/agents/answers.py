@@ -1,37 +1,62 @@
 """The answers that an agent gets: figures with units. Their JSON Schema is made from these classes."""
 
-from pydantic import BaseModel, Field
+from typing import Annotated
 
-Part = dict[str, float]
+from pydantic import AfterValidator, BaseModel, Field
+
+DIGITS = 6
+"""Significant digits of a figure: more than a model is right to, and a third of the characters."""
+
+Figure = Annotated[float, AfterValidator(lambda figure: float(f"{figure:.{DIGITS}g}"))]
+Part = dict[str, Figure]
+
+
+class FrequencyAndDamping(BaseModel):
+    """A mode by its two figures."""
+
+    frequency_hz: Figure
+    damping_percent: Figure
 
 
 class ModeAnswer(BaseModel):
     """An eigenvalue of the coupled system, with its eigenvector and what takes part."""
 
     name: str | None = Field(description="the field's name of the mode, if it has one")
-    frequency_hz: float = Field(description="Im λ / 2π [Hz]")
-    damping_percent: float = Field(
+    frequency_hz: Figure = Field(description="Im λ / 2π [Hz]")
+    damping_percent: Figure = Field(
         description="damping ratio −Re λ / |λ| [%]; negative if it grows"
     )
-    real: float = Field(description="Re λ [1/s]")
-    imag: float = Field(description="Im λ [rad/s]")
+    real: Figure = Field(description="Re λ [1/s]")
+    imag: Figure = Field(description="Im λ [rad/s]")
     participation: Part = Field(
         description="state: magnitude of its participation factor; the five largest, the largest first"
     )
-    shape: dict[str, tuple[float, float]] = Field(
+    shape: dict[str, tuple[Figure, Figure]] = Field(
         description="machine: magnitude and angle [deg] of its speed in the right eigenvector, the largest at 1 and 0"
     )
 
 
 class ScenarioModesAnswer(BaseModel):
-    """The modes of one scenario between 0.1 and 2 Hz, and whether all of its eigenvalues are damped."""
+    """The modes of one scenario in a range of frequencies, and whether all of its eigenvalues are damped."""
 
     scenario: str
     stable: bool | None = Field(description="of all eigenvalues; null if it is not known")
     verdict: str = Field(description="the verdict in one sentence, with its cause")
     eigenvalues: int = Field(description="how many eigenvalues the verdict rests on")
-    modes: list[ModeAnswer] = Field(description="oscillatory modes, the least damped first")
-    left_out: int = Field(description="modes that are not listed, all better damped")
+    frequency_range_hz: tuple[Figure, Figure] = Field(
+        description="the frequencies of the modes that are listed [Hz]; the verdict is of all"
+    )
+    modes: list[ModeAnswer] = Field(
+        description="oscillatory modes in that range, the least damped first"
+    )
+    left_out: int = Field(description="modes in that range that are not listed, all better damped")
+    outside_range: int | None = Field(
+        description="oscillatory modes outside of that range, which `frequencies_hz` asks for; null if they are not "
+        "all known"
+    )
+    least_damped_outside: FrequencyAndDamping | None = Field(
+        description="the least damped of those outside of the range; null if there is none"
+    )
 
 
 class ModesAnswer(BaseModel):
@@ -63,18 +88,18 @@ class RunSummaryAnswer(BaseModel):
     stable: bool | None = Field(description="null if the run does not tell")
     verdict: str
     remark: str = Field(description="why the verdict is what it is")
-    frequency_hz: float | None = Field(description="of the mode that decides [Hz]")
-    damping_percent: float | None = Field(description="its damping ratio [%]")
+    frequency_hz: Figure | None = Field(description="of the mode that decides [Hz]")
+    damping_percent: Figure | None = Field(description="its damping ratio [%]")
     components: Part = Field(description="who takes part in that mode")
-    stop_time_s: float
+    stop_time_s: Figure
 
 
 class ScreenedModeAnswer(BaseModel):
     """A mode followed over operating points and outages, where it is damped least."""
 
     name: str
-    frequency_hz: float
-    damping_percent: float
+    frequency_hz: Figure
+    damping_percent: Figure
     point: str
     outage: str
     participation: Part
@@ -113,8 +138,8 @@ class BusStrengthAnswer(BaseModel):
     """Short-circuit strength of a bus, and SCR of a converter there."""
 
     bus: str
-    s_sc_mva: float = Field(description="initial three-phase short-circuit power [MVA]")
-    scr: float | None = Field(
+    s_sc_mva: Figure = Field(description="initial three-phase short-circuit power [MVA]")
+    scr: Figure | None = Field(
         description="short-circuit ratio of the converters there; null without one"
     )
 
@@ -131,12 +156,12 @@ class InfluenceAnswer(BaseModel):
     """How a parameter of a running FMU moves a mode."""
 
     parameter: str
-    value: float
+    value: Figure
     unit: str | None = Field(description="unit of the value; null if it has none")
-    damping_points_per_unit: float | None = Field(
+    damping_points_per_unit: Figure | None = Field(
         description="change of the damping ratio [percentage points] for each unit by which the parameter grows"
     )
-    damping_points_per_percent: float | None = Field(
+    damping_points_per_percent: Figure | None = Field(
         description="the same for each percent of its value; null if the value is 0"
     )
 
@@ -145,8 +170,8 @@ class SensitivitiesAnswer(BaseModel):
     """Which parameters move a mode, the strongest first."""
 
     scenario: str
-    mode_frequency_hz: float
-    mode_damping_percent: float
+    mode_frequency_hz: Figure
+    mode_damping_percent: Figure
     influences: list[InfluenceAnswer]
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.case import BUILT_IN, built_in_cases
+from orchestrator.cases.form.names import close_names
 from orchestrator.core.errors import InputError
 from orchestrator.face.agents.answers import (
     BusStrengthAnswer,
@@ -28,6 +29,7 @@ from orchestrator.face.agents.answers import (
 )
 from orchestrator.face.agents.guard import is_within
 from orchestrator.face.agents.question import Allowance, NoAnswerError, ask
+from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ
 from orchestrator.output.results.lock import FolderInUseError, hold_folder
 
 VERBS = (
@@ -47,9 +49,6 @@ MOST_ROWS = 20
 
 MOST_PARTS = 5
 """States that take part in a mode, which `modes` lists: what follows is small."""
-
-DIGITS = 6
-"""Significant digits of a mode's figures: more than a model is right to, and a third of the characters."""
 
 MOST_DECIDING = 3
 """Growing modes that an explanation names, the least damped first."""
@@ -93,18 +92,24 @@ class Verbs:
         return CasesAnswer(built_in=titles, files=[*islice(files, MOST_FILES)])
 
     def modes(
-        self, case: str, scenario: str | None = None, values: Values | None = None
+        self,
+        case: str,
+        scenario: str | None = None,
+        values: Values | None = None,
+        frequencies_hz: tuple[float, float] = ELECTROMECHANICAL_HZ,
     ) -> ModesAnswer:
         """Compute modes of a case: frequency, damping, participation factors and mode shape, each with its own mode.
 
         ``values`` sets parameters first, such as {"grid.X_L": 0.3}. Without ``scenario`` the modes are those of the
-        case's first one; the others are named with their verdicts.
+        case's first one; the others are named with their verdicts. ``frequencies_hz``: lowest and highest frequency
+        [Hz] of the modes that are listed; those outside are counted.
         """
-        found = self._ask("modes", case, scenario, values)
+        low, high = frequencies_hz
+        found = self._ask("modes", case, scenario, values, "--range", f"{low!r}:{high!r}")
         first, *others = found["scenarios"]
         return ModesAnswer(
             case=found["case"],
-            scenarios=[_scenario_modes(first)],
+            scenarios=[_scenario_modes(first, frequencies_hz)],
             others={one["name"]: one["stability"]["sentence"] for one in others},
             questions=_first(found["questions"]),
         )
@@ -244,8 +249,10 @@ class Verbs:
         try:
             return self._file(case)
         except InputError as error:
+            near = close_names(case, built_in_cases())
+            hint = f" {near}" if near else ""
             raise NoAnswerError(
-                f"{error}; or name a built-in case: {', '.join(built_in_cases())}"
+                f"{error};{hint} the built-in cases: {', '.join(built_in_cases())}"
             ) from None
 
     def _file(self, name: str) -> str:
@@ -314,30 +321,32 @@ def _largest(parts: Mapping[str, float], most: int = MOST_ROWS) -> dict[str, flo
     return dict(ordered[:most])
 
 
-def _rounded(figure: float) -> float:
-    return float(f"{figure:.{DIGITS}g}")
-
-
-def _scenario_modes(one: Mapping[str, Any]) -> ScenarioModesAnswer:
+def _scenario_modes(
+    one: Mapping[str, Any], frequencies_hz: tuple[float, float]
+) -> ScenarioModesAnswer:
     modes = sorted(one["modes"], key=lambda mode: mode["damping_percent"])
+    outside = one.get("outside_range") or {"oscillatory_modes": None, "least_damped": None}
     return ScenarioModesAnswer(
         scenario=one["name"],
         stable=one["stable"],
         verdict=one["stability"]["sentence"],
         eigenvalues=one["stability"]["eigenvalues"],
+        frequency_range_hz=frequencies_hz,
         modes=[_mode(mode) for mode in modes[:MOST_ROWS]],
         left_out=max(0, len(modes) - MOST_ROWS),
+        outside_range=outside["oscillatory_modes"],
+        least_damped_outside=outside["least_damped"],
     )
 
 
 def _mode(mode: Mapping[str, Any]) -> ModeAnswer:
-    parts = {row["state"]: _rounded(row["factor"]) for row in mode["participation"]}
+    parts = {row["state"]: row["factor"] for row in mode["participation"]}
     return ModeAnswer(
         name=mode["name"],
-        frequency_hz=_rounded(mode["frequency_hz"]),
-        damping_percent=_rounded(mode["damping_percent"]),
-        real=_rounded(mode["real"]),
-        imag=_rounded(mode["imag"]),
+        frequency_hz=mode["frequency_hz"],
+        damping_percent=mode["damping_percent"],
+        real=mode["real"],
+        imag=mode["imag"],
         participation=_largest(parts, MOST_PARTS),
         shape=_shape(mode["shape"]),
     )
@@ -349,8 +358,8 @@ def _shape(rows: Iterable[Mapping[str, Any]]) -> dict[str, tuple[float, float]]:
     ordered = sorted(speeds, key=lambda row: float(row["magnitude"]), reverse=True)
     return {
         row["state"].partition(".")[0]: (
-            _rounded(row["magnitude"] / ordered[0]["magnitude"]),
-            _rounded((row["angle_deg"] - ordered[0]["angle_deg"] + 180) % 360 - 180),
+            row["magnitude"] / ordered[0]["magnitude"],
+            (row["angle_deg"] - ordered[0]["angle_deg"] + 180) % 360 - 180,
         )
         for row in ordered[:MOST_ROWS]
     }

@@ -9,7 +9,9 @@ from contextlib import chdir, redirect_stderr, redirect_stdout, suppress
 import pytest
 
 import orchestrator as gfor
-from orchestrator.face.agents import question
+from orchestrator.cases.case import BUILT_IN
+from orchestrator.face.agents import question, verbs
+from orchestrator.face.agents.answers import BusStrengthAnswer, ScreenedModeAnswer
 from orchestrator.face.agents.question import Allowance, NoAnswerError, ask
 from orchestrator.face.agents.verbs import Verbs, _deciding, _growth_elsewhere
 from orchestrator.face.cli import main
@@ -188,8 +190,47 @@ def test_a_question_ends_in_time(tmp_path):
 
 
 def test_an_error_is_the_commands_own(tmp_path, here):
-    with pytest.raises(NoAnswerError, match="scenario"):
+    with pytest.raises(NoAnswerError, match="scenario") as refused:
         Verbs(allowance(tmp_path)).modes("two_area", "no_such")
+    assert str(BUILT_IN) not in str(refused.value)  # where it is installed is nobody's business
+
+
+def test_a_slip_in_a_cases_name_gets_the_name_that_is_near(tmp_path):
+    with pytest.raises(
+        NoAnswerError, match=r"did you mean kundur\? the built-in cases: .*two_area"
+    ):
+        Verbs(allowance(tmp_path)).modes("kundr")
+
+
+def test_modes_outside_of_the_range_are_counted_and_can_be_asked_for(tmp_path, monkeypatch):
+    asked = []
+    stability = {"sentence": "stable", "eigenvalues": 82}
+    least = {"frequency_hz": 3.123456789, "damping_percent": 1.0}
+    outside = {"oscillatory_modes": 9, "least_damped": least}
+    scenario = {"name": "manual", "stable": True, "stability": stability, "modes": []}
+    content = {"case": "kundur", "scenarios": [scenario | {"outside_range": outside}]}
+    monkeypatch.setattr(
+        verbs, "ask", lambda words, _: asked.append(words) or content | {"questions": []}
+    )
+    (usual,) = Verbs(allowance(tmp_path)).modes("kundur").scenarios
+    assert usual.frequency_range_hz == (0.1, 2.0)
+    assert (usual.outside_range, usual.least_damped_outside.frequency_hz) == (9, 3.12346)
+    Verbs(allowance(tmp_path)).modes("kundur", frequencies_hz=(0.5, 60.0))
+    assert [words[words.index("--range") + 1] for words in asked] == ["0.1:2.0", "0.5:60.0"]
+
+
+def test_every_figure_of_an_answer_has_six_digits():
+    strength = BusStrengthAnswer(bus="bus_1", s_sc_mva=1234.56789, scr=None)
+    assert strength.s_sc_mva == 1234.57
+    parts = ScreenedModeAnswer(
+        name="",
+        frequency_hz=1 / 3,
+        damping_percent=-1 / 3,
+        point="",
+        outage="",
+        participation={"sg1": 2 / 3},
+    )
+    assert (parts.frequency_hz, parts.participation) == (0.333333, {"sg1": 0.666667})
 
 
 def test_an_explanation_names_who_swings(tmp_path, here):

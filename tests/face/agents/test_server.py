@@ -123,8 +123,9 @@ def test_hostile_arguments_are_refused_in_words(answers):
 def test_an_argument_that_a_verb_has_not_is_refused_and_never_dropped(answers):
     _, (tools, (*_, unknown, missing, _, _, _)) = answers
     assert unknown.is_error
-    assert "modes: there is no argument 'set'; it takes: case, scenario, values" in (
-        unknown.content[0].text
+    assert (
+        "modes: there is no argument 'set'; it takes: case, scenario, values, frequencies_hz"
+        in (unknown.content[0].text)
     )
     assert missing.is_error
     assert "explain: give 'scenario'" in missing.content[0].text
