@@ -56,7 +56,9 @@ def _remark(result: ModesResult, mode: Mode | None) -> str:
     place = _outside(result, verdict.mode)
     who = _who_grows(result, verdict.mode) if place else ""
     because = "; cause: the coupling" if verdict.cause is Cause.COUPLING else ""
-    grows = f"grows at {verdict.mode.eigenvalue.real:+.3g} 1/s{place}{who}{because}{_hidden(verdict)}"
+    grows = (
+        f"grows at {verdict.mode.eigenvalue.real:+.3g} 1/s{place}{who}{because}{_hidden(verdict)}"
+    )
     if swing and not place:
         return f"{grows}; {swing}"
     if mode is not None and mode.eigenvalue.real > 0:
@@ -69,7 +71,9 @@ def _hidden(verdict: Stability) -> str:
     step = verdict.hidden_by_step
     if step is None:
         return ""
-    return f" without a communication step; a step of {step:g} s, as in this row's damping, hides it"
+    return (
+        f" without a communication step; a step of {step:g} s, as in this row's damping, hides it"
+    )
 
 
 def _who_grows(result: ModesResult, growing: Mode) -> str:

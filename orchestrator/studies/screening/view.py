@@ -509,6 +509,7 @@ def as_json(summary: Summary) -> dict[str, Any]:
         "items": len(result.items),
         "complete": result.complete,
         "stable": summary.stable,
+        "verdict": verdict_sentence(summary),
         "counted_at_all_frequencies": summary.counted_items,
         "slowest_growth_counted": summary.slowest,
         "nothing_restores": free,

@@ -15,12 +15,14 @@ import numpy as np
 from orchestrator.core.late import xr
 from orchestrator.linear.spectra.modes import damping_percent
 from orchestrator.output.report.short_texts import kinds_of
+from orchestrator.output.report.verdict_sentence import VerdictSentence
 from orchestrator.output.results.file_writers import provenance, save_netcdf, save_table
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.studies.sweep.axes import grid_places
 from orchestrator.studies.sweep.point import PointRecord
 from orchestrator.studies.sweep.sweep import ScenarioSweep, SweepResult
 from orchestrator.studies.sweep.trajectories import GridPlace, Trajectory
+from orchestrator.studies.sweep.verdicts import verdicts
 
 _FIGURES = ("real", "imag", "frequency", "damping", "similarity")
 _ATTRIBUTES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
@@ -226,8 +228,13 @@ def _attributes(samples: Samples) -> dict[str, Any]:
             "basis": json.dumps(result.plan.scenarios[0].basis),
             "warned": json.dumps([*_questions_of(samples), *warned(samples)]),
             "frequency_range_hz": [low, high],
+            "verdicts": json.dumps([_verdict_json(*one) for one in verdicts(result)]),
         }
     )
+
+
+def _verdict_json(title: str, verdict: VerdictSentence) -> dict[str, Any]:
+    return {"scenario": title, "stable": verdict.good, "sentence": str(verdict)}
 
 
 def _questions_of(samples: Samples) -> dict[str, None]:

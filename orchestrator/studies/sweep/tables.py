@@ -1,21 +1,17 @@
 """A sweep on a terminal."""
 
-import math
-
 from rich.markup import escape
 from rich.table import Table
 
 from orchestrator.core.errors import number_of
 from orchestrator.output.report.terminal_tables import make_table
-from orchestrator.studies.sweep.axes import grid_places
 from orchestrator.studies.sweep.dataset import Samples, warned
 from orchestrator.studies.sweep.limit import Ending
 from orchestrator.studies.sweep.plots import axis_label
-from orchestrator.studies.sweep.sweep import ScenarioSweep
 from orchestrator.studies.sweep.trajectories import GridPlace
+from orchestrator.studies.sweep.verdicts import place_text, value_text, verdicts
 
 _FAILURES_SHOWN = 5  # points that could not be computed
-_TURNS = 3  # changes of stability along an axis that are named
 
 
 def trajectories(samples: Samples) -> Table:
@@ -59,37 +55,7 @@ def trajectories(samples: Samples) -> Table:
 
 def stability(samples: Samples) -> list[str]:
     """The verdict on every scenario over all its points, as rich markup; an unstable one first."""
-    axes, lines = samples.axes, []
-    order = {False: 0, None: 1, True: 2}
-    total = math.prod(len(axis.values) for axis in axes)
-    for sweep in sorted(samples.result.scenarios, key=lambda s: order[s.stable]):
-        title, places, known = (
-            escape(sweep.prepared.title),
-            sweep.unstable(axes),
-            sweep.counts(axes),
-        )
-        rest = f" ({known[True]} stable, {known[None]} not known)" if known[None] else ""
-        if places:
-            worst = sweep.points[places[0]].because
-            where = escape(
-                f"at {len(places)} of {total} points{rest}; worst at {place_text(samples, places[0])}: {worst}"
-                f"{_turns(samples, sweep)}"
-            )
-            lines.append(f"[bold red]UNSTABLE[/]: {title}: {where}")
-        elif sweep.stable is False:
-            lines.append(
-                f"[bold red]UNSTABLE[/]: {title}: between two points of the grid{rest}; take more points"
-            )
-        elif known[None]:
-            what = f"{known[None]} of {total} points have no verdict, {known[True]} are stable, 0 are unstable"
-            lines.append(f"[bold yellow]not known[/]: {title}: {what}")
-        elif sweep.stable is None:
-            lines.append(
-                f"[bold yellow]not known[/]: {title}: a point between those of the grid has no verdict"
-            )
-        else:
-            lines.append(f"[bold green]stable[/]: {title}: nothing grows at any of {total} points")
-    return lines
+    return [verdict.markup(title) for title, verdict in verdicts(samples.result)]
 
 
 def limits(samples: Samples) -> list[str]:
@@ -101,24 +67,6 @@ def limits(samples: Samples) -> list[str]:
         found.append(f"[bold {colour}]{escape(limit.title)}[/]: {escape(limit.lines[0])}")
         found += [f"  then: {escape(line)}" for line in limit.lines[1:]]
     return found
-
-
-def _turns(samples: Samples, sweep: ScenarioSweep) -> str:
-    if len([axis for axis in samples.axes if len(axis.values) > 1]) != 1:
-        return ""
-    places = sorted(
-        grid_places(samples.axes),
-        key=lambda place: [float(v) for v in samples.setting(place).values()],
-    )
-    words = {True: "stable", False: "unstable", None: "not known"}
-    verdicts = [sweep.points[place].stability.get("stable") for place in places]
-    turns = [
-        f"{words[one]} at {place_text(samples, here)}, {words[other]} at {place_text(samples, there)}"
-        for here, there, one, other in zip(places, places[1:], verdicts, verdicts[1:], strict=False)
-        if one is not other
-    ]
-    more = f"; {len(turns) - _TURNS} more changes" if len(turns) > _TURNS else ""
-    return f"; {'; '.join(turns[:_TURNS])}{more}" if turns else ""
 
 
 def remarks(samples: Samples) -> list[str]:
@@ -133,7 +81,7 @@ def remarks(samples: Samples) -> list[str]:
             f"{number_of(len(failures), 'point')} of {result.plan.number_of_points} failed:"
         )
         texts += [
-            f"  {sweep.prepared.name}, {place_text(samples, place)}: {error}"
+            f"  {sweep.prepared.name}, {place_text(samples.axes, place)}: {error}"
             for sweep, place, error in failures[:_FAILURES_SHOWN]
         ]
         more = len(failures) - _FAILURES_SHOWN
@@ -147,8 +95,8 @@ def remarks(samples: Samples) -> list[str]:
     ]
     for sweep, trajectory, place in breaks[:_FAILURES_SHOWN]:
         texts.append(
-            f"{sweep.prepared.name}: {trajectory.name} begins at {place_text(samples, place)}, not recognised in the "
-            "point before; take more points there"
+            f"{sweep.prepared.name}: {trajectory.name} begins at {place_text(samples.axes, place)}, not recognised in "
+            "the point before; take more points there"
         )
     more = len(breaks) - _FAILURES_SHOWN
     texts += [f"… and {more} more beginnings, marked 'broken' in sweep.csv"] if more > 0 else []
@@ -160,15 +108,5 @@ def remarks(samples: Samples) -> list[str]:
     return [*texts, *warned(samples)]
 
 
-def place_text(samples: Samples, place: GridPlace) -> str:
-    """``grid.X_L = 0.1 pu``."""
-    setting = samples.setting(place)
-    return ", ".join(f"{a.key} = {_value(setting[a.key])} {a.unit}".rstrip() for a in samples.axes)
-
-
 def _values(samples: Samples, place: GridPlace) -> str:
-    return ", ".join(_value(value) for value in samples.setting(place).values())
-
-
-def _value(value: float | bool) -> str:
-    return str(value).lower() if isinstance(value, bool) else f"{value:g}"
+    return ", ".join(value_text(value) for value in samples.setting(place).values())

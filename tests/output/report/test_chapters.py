@@ -17,7 +17,7 @@ from orchestrator.output.report.html.chapters.studies import of_screening, of_si
 from orchestrator.output.report.html.elements import with_units_held
 from orchestrator.output.report.html.first_page import first_page
 from orchestrator.output.report.html.least_damped import LeastDamped
-from orchestrator.output.report.html.page import _PICTURE, write_report
+from orchestrator.output.report.html.page import _PICTURE, _with_first_picture_above, write_report
 from orchestrator.output.results import origin
 from orchestrator.output.results.manifest import ResultsWarning, read_manifest, write_manifest
 from orchestrator.studies.sweep.limit import Ending, ParameterLimit, Until
@@ -226,7 +226,7 @@ def written(folders, tmp_path, **more):
 
 
 def test_a_headline_breaks_nowhere_between_a_figure_and_its_unit():
-    held = with_units_held('<p class="verdict"><b>−0.90 % at 2 of 3, 12 s</b></p><pre>12 s</pre>')
+    held = with_units_held('<p class="verdict"><b>-0.90 % at 2 of 3, 12 s</b></p><pre>12 s</pre>')
     assert held == (
         '<p class="verdict"><b>−0.90\N{NO-BREAK SPACE}% at 2 of 3, 12\N{NO-BREAK SPACE}s</b></p><pre>12 s</pre>'
     )
@@ -237,8 +237,8 @@ def test_the_first_page_answers_every_study(folders, tmp_path):
     first = text[: text.index("<section")]
     for said in (
         "not as required: with K = 200 pu the mode has 18.00 % of damping, 10.60 % before, 20.00 % wanted",
-        "not known whether stable everywhere: 2 operating points, 3 outages; least damped 0.930 Hz, 3.80 %",
-        "mon, sg3: no power flow: sg5 would need 129 %",
+        "not known whether stable everywhere of 2 operating points and 3 outages; least damped 0.930 Hz, 3.80 %",
+        "mon, outage sg3: no power flow: sg5 would need 129 %",
         "growth outside of the range was counted at some of them only",
         "vendor.fmu: wrong rated frequency",
         "anything after it",
@@ -668,6 +668,30 @@ def test_a_picture_takes_its_legend_along_to_the_first_page():
 def test_an_unfinished_screening_names_what_is_left(tmp_path):
     found = of_screening(tmp_path / "screening.json", SCREENING | {"complete": False})
     assert "the cases that were not computed yet" in found.not_judged
+
+
+def test_a_screening_answers_in_the_words_of_the_terminal(tmp_path):
+    """A unit beyond its rating is judged: what the verdict says of it stands once, and not as *not judged*."""
+    content = SCREENING | {"beyond_rating": "at 2 of 7 a unit is beyond its rating", "points": 1}
+    verdict = "UNSTABLE: at 1 of 8 points and outages; at 2 of 7 a unit is beyond its rating"
+    new = of_screening(tmp_path / "screening.json", content | {"verdict": verdict})
+    assert (new.answer, list(new.doubts)) == (verdict, [])
+    old = of_screening(tmp_path / "screening.json", content)
+    assert list(old.doubts) == [content["beyond_rating"]]
+    assert not any("rating" in text for text in (*new.not_judged, *old.not_judged))
+    assert any(text.startswith("outage sg3: no power flow") for text in new.not_judged)
+
+
+def test_the_first_picture_is_told_once_by_its_number():
+    """It moves to the top with the number by which its section calls it."""
+    picture = '<svg class="chart">…</svg><figcaption>1</figcaption>'
+    numbered = [("A", f'<a href="#figure-1">Figure 1</a><figure id="figure-1">{picture}</figure>.')]
+    above, (section,) = _with_first_picture_above(numbered)
+    assert above == f'<figure id="figure-1">{picture}</figure>'
+    assert section == ("A", '<a href="#figure-1">Figure 1</a>.')
+    above, (section,) = _with_first_picture_above([("B", f"<p>{picture}</p>")])
+    assert above == picture
+    assert "stands at the top" in section[1]
 
 
 def test_an_answer_that_begins_with_a_name_keeps_its_letters(tmp_path):

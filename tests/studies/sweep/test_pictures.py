@@ -93,7 +93,7 @@ def test_participation_begins_at_0(drawn, states):
 
 @pytest.mark.parametrize("beyond", [0, 1])
 def test_failures_are_listed_up_to_a_number_and_the_rest_is_counted(monkeypatch, beyond):
-    monkeypatch.setattr(tables, "place_text", lambda samples, place: str(place))
+    monkeypatch.setattr(tables, "place_text", lambda axes, place: str(place))
     monkeypatch.setattr(tables, "warned", lambda result: [])
     sweep = SimpleNamespace(prepared=bare_scenario())
     failed = [(sweep, place, "no power flow") for place in range(tables._FAILURES_SHOWN + beyond)]
@@ -104,7 +104,7 @@ def test_failures_are_listed_up_to_a_number_and_the_rest_is_counted(monkeypatch,
         refined=0,
         failures=lambda: iter(failed),
     )
-    texts = tables.remarks(SimpleNamespace(result=result))
+    texts = tables.remarks(SimpleNamespace(result=result, axes=()))
     assert len(texts) == 1 + tables._FAILURES_SHOWN + beyond
     assert [text for text in texts if "more" in text] == ["  … and 1 more, in sweep.csv"] * beyond
 

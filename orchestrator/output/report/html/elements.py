@@ -93,18 +93,21 @@ def paragraphs(good: bool | None, texts: Sequence[str]) -> str:
 
 
 _UNIT = re.compile(r"(?<=\d) (?=(?:%|°|Hz|s|ms|pu|rad/s|1/s|k?V|k?A|k?W|MW|Mvar|MVA)(?![\w/]))")
+_MINUS = re.compile(r"(?<![\w=.:-])-(?=\d)")
 _HEADLINE = re.compile(r'<p class="verdict">.*?</p>|<span class="remark">.*?</span>', re.DOTALL)
 _TAG = re.compile(r"(<[^>]*>)")
 
 
 def with_units_held(findings: str) -> str:
-    """Return what stands on top of a page, with every figure beside its unit in verdicts and remarks."""
+    """Return what stands on top of a page; in verdicts and remarks every figure stays beside its unit and has the minus
+    sign of tables."""
     return _HEADLINE.sub(_hold_units, findings)
 
 
 def _hold_units(found: re.Match[str]) -> str:
     parts = _TAG.split(found[0])
-    parts[::2] = [_UNIT.sub("\N{NO-BREAK SPACE}", text) for text in parts[::2]]
+    held = [_UNIT.sub("\N{NO-BREAK SPACE}", text) for text in parts[::2]]
+    parts[::2] = [_MINUS.sub("\N{MINUS SIGN}", text) for text in held]
     return "".join(parts)
 
 

@@ -17,7 +17,10 @@ _OPEN = 4
 counted."""
 
 _LONGEST = 240
-"""Characters of each of them: three lines of the page."""
+"""Characters of each of them in a table of several studies: three lines of the page."""
+
+_LONGEST_OF_ONE = 1200
+"""Characters of each of them below the answer of a single study: the longest questions have 900."""
 
 
 def first_page(chapters: Sequence[Chapter], title: str = "") -> str:
@@ -64,9 +67,9 @@ def _of_scenarios(chapter: Chapter, notes: dict[str, str], title: str) -> str:
 def _answer_with_notes(chapter: Chapter, answer: str, notes: dict[str, str], title: str) -> str:
     """Return a study's question, its answer, and in short notes below how sure that is."""
     below = [
-        ("How sure", escape(short(chapter.sure, 2 * _LONGEST))),
-        ("Doubts", "; ".join(_sentences(chapter.doubts, notes))),
-        ("Not judged", "; ".join(_not_judged(chapter, notes))),
+        ("How sure", escape(short(chapter.sure, _LONGEST_OF_ONE))),
+        ("Doubts", "; ".join(_sentences(chapter.doubts, notes, _LONGEST_OF_ONE))),
+        ("Not judged", "; ".join(_not_judged(chapter, notes, _LONGEST_OF_ONE))),
         ("Results", escape(", made by ".join(_places_and_options(chapter)))),
     ]
     told = "".join(f"<li>{name}: {text}</li>" for name, text in below if text)
@@ -95,13 +98,13 @@ def _sure_and_doubts(chapter: Chapter, notes: dict[str, str]) -> list[str]:
     return [escape(short(chapter.sure, 2 * _LONGEST)), *doubts]
 
 
-def _not_judged(chapter: Chapter, notes: dict[str, str]) -> list[str]:
-    return _sentences(chapter.not_judged, notes) or [_NOTHING]
+def _not_judged(chapter: Chapter, notes: dict[str, str], longest: int = _LONGEST) -> list[str]:
+    return _sentences(chapter.not_judged, notes, longest) or [_NOTHING]
 
 
-def _sentences(texts: Sequence[str], notes: dict[str, str]) -> list[str]:
+def _sentences(texts: Sequence[str], notes: dict[str, str], longest: int = _LONGEST) -> list[str]:
     """Shorten a study's sentences, and count those beyond a few; one of several studies is a note below them."""
-    told = [escape(notes.get(text) or short(text, _LONGEST)) for text in texts]
+    told = [escape(notes.get(text) or short(text, longest)) for text in texts]
     return [*told[:_OPEN], *_more(len(told))]
 
 

@@ -78,11 +78,7 @@ def page(
         for chapter, found in told
         for heading, text in found
     ]
-    charts = (re.search(_PICTURE, text, re.DOTALL) for _, text in content)
-    picture = next((found[0] for found in charts if found), "")
-    first = "<p>Its picture stands at the top of this page.</p>"
-    if picture:
-        content = [(heading, text.replace(picture, first)) for heading, text in content]
+    picture, content = _with_first_picture_above(content)
     content = [] if short else content
     if against is not None:
         before = (
@@ -106,6 +102,20 @@ def page(
     above = "".join(paragraphs(False, [text]) for text in (differ, changed) if text)
     findings = above + first_page(chapters, title) + picture + found + answers
     return document(title, kind, findings, content, names=_names_of(chapters, runs))
+
+
+def _with_first_picture_above(content: Sections) -> tuple[str, Sections]:
+    """Take the first picture out of the sections: returned with the number by which a text there calls it, else a
+    sentence says where it went."""
+    pictures = (re.search(_PICTURE, text, re.DOTALL) for _, text in content)
+    first = next((found for found in pictures if found), None)
+    if first is None:
+        return "", content
+    picture = first[0]
+    numbered = re.search(f"<figure id=[^>]*>{re.escape(picture)}</figure>", first.string)
+    moved = numbered[0] if numbered else picture
+    left = "" if numbered else "<p>Its picture stands at the top of this page.</p>"
+    return moved, [(heading, text.replace(moved, left)) for heading, text in content]
 
 
 def _title_of(places: Sequence[Path], headings: Sequence[str]) -> str:

@@ -1,5 +1,6 @@
 """The sections of the page that sweeps and designs fill."""
 
+import json
 from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
@@ -29,7 +30,8 @@ def sweep(sweep: xr.Dataset, scenarios: Sequence[Mapping[str, Any]], figures: Fi
     names = [str(s) for s in shown["scenario"].values]
     known = [s["name"] for s in scenarios]
     shades = {s: colour(known.index(s) if s in known else k) for k, s in enumerate(names)}
-    title = {s["name"]: s["title"] for s in scenarios}
+    title = json.loads(sweep.attrs.get("title", "{}"))
+    title |= {s["name"]: s["title"] for s in scenarios}
     unit = shown[axis].attrs.get("units", "1")
     label = f"{axis} [{unit}]" if unit != "1" else axis
     key = legend((title.get(s, s), shades[s]) for s in names)
@@ -53,10 +55,9 @@ def sweep(sweep: xr.Dataset, scenarios: Sequence[Mapping[str, Any]], figures: Fi
     ):
         curves = []
         for s in names:
-            for rank, (name, points) in enumerate(
-                _curves_by_name(shown, s, axis, quantity).items()
-            ):
-                label_of = title.get(s, s) if rank == 0 else f"{title.get(s, s)}: {name}"
+            found = _curves_by_name(shown, s, axis, quantity)
+            for rank, (name, points) in enumerate(found.items()):
+                label_of = f"{title.get(s, s)}: {name}" if len(found) > 1 else title.get(s, s)
                 curves.append(ChartCurve(label_of, shades[s], *points, dashed=rank > 0))
         if curves:
             picture, link = figures.add(

@@ -32,23 +32,17 @@ _DESIGNED = ("target", "predicted", "achieved")
 
 
 def of_screening(file: Path, c: Content) -> Chapter:
-    where = "somewhere" if c["stable"] is False else "everywhere"
-    points, outages = number_of(c["points"], "operating point"), number_of(c["outages"], "outage")
-    answer = f"{VERDICTS[c['stable']]} {where}: {points}, {outages}"
     least = min(c["modes"], key=lambda mode: mode["worst"]["damping_percent"], default=None)
     told = []
     if least is not None:
-        worst = least["worst"]
-        told.append(LeastDamped.of({**worst, "components": least.get("participation")}))
-        answer += (
-            f"; least damped {worst['frequency_hz']:.3f} Hz, {worst['damping_percent']:.2f} %, "
-            f"{'' if c['points'] == 1 else worst['point'] + ', '}outage {worst['outage']}"
-        )
-    lost = [c["beyond_rating"]] if c.get("beyond_rating") else []
+        told.append(LeastDamped.of({**least["worst"], "components": least.get("participation")}))
+    lost = []
     for failure in c["failures"]:
         point = "" if c["points"] == 1 else f"{failure['point']}, "
         why = f"{failure['status']}: {first_sentence(failure['why'])}"
-        lost.append(f"{point}{failure['outage']}: {why}")
+        lost.append(f"{point}outage {failure['outage']}: {why}")
+    verdict = c.get("verdict")  # none in results of earlier versions
+    beyond = c.get("beyond_rating") if verdict is None else None  # the verdict tells of it
     if not c.get("complete", True):
         lost.append("the cases that were not computed yet")
     computed = int(c["items"]) - len(c["failures"])
@@ -62,13 +56,27 @@ def of_screening(file: Path, c: Content) -> Chapter:
     return Chapter(
         file,
         "Which operating point and which outage is worst?",
-        answer,
+        verdict or _verdict_by_figures(c, least),
         c["stable"],
         f"{computed} of {number_of(c['items'], 'case')} computed, {_growth_counted(counted, computed)}",
         lost,
+        doubts=[beyond] if beyond else [],
         page="screening.html",
         least=told,
     )
+
+
+def _verdict_by_figures(c: Content, least: Content | None) -> str:
+    """Return the verdict on a screening that has not written it."""
+    where = "somewhere" if c["stable"] is False else "everywhere"
+    points, outages = number_of(c["points"], "operating point"), number_of(c["outages"], "outage")
+    answer = f"{VERDICTS[c['stable']]} {where} of {points} and {outages}"
+    if least is None:
+        return answer
+    worst = least["worst"]
+    at = "" if c["points"] == 1 else f"{worst['point']}, "
+    figures = f"{worst['frequency_hz']:.3f} Hz, {worst['damping_percent']:.2f} %"
+    return f"{answer}; least damped {figures}, {at}outage {worst['outage']}"
 
 
 def _growth_counted(counted: int, computed: int) -> str:
@@ -194,19 +202,27 @@ def of_sweep(place: Path, sweep: xr.Dataset) -> Chapter:
             doubts=doubts,
             bases=bases,
         )
-    answer = f"least damping {float(least.min()):.2f} % at {where}" + (
-        f"; UNSTABLE at {number_of(lost, 'point')}" if lost else ""
-    )
+    told = json.loads(sweep.attrs.get("verdicts", "[]"))  # none in results of earlier versions
+    said = "; ".join(_verdict_of_scenario(one, alone=len(told) == 1) for one in told)
+    good = all_true(one["stable"] for one in told) if told else None
+    if lost and not told:
+        said, good = f"UNSTABLE at {number_of(lost, 'point')}", False
+    least_damping = f"least damping {float(least.min()):.2f} % at {where}"
     return Chapter(
         place,
         f"How do the modes move along {studies.axis_of(sweep)}?",
-        answer,
-        False if lost else None,
+        "; ".join(filter(None, (said, least_damping))),
+        good,
         f"{models}each point is a linear model of the coupled FMUs there",
         open_,
         doubts=doubts,
         bases=bases,
     )
+
+
+def _verdict_of_scenario(told: Content, *, alone: bool) -> str:
+    """A scenario's verdict over all points; the only one needs no name."""
+    return str(told["sentence"]) if alone else f"{told['scenario']}: {told['sentence']}"
 
 
 def of_interactions(file: Path, c: Content) -> Chapter:

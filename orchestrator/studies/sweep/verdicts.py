@@ -1,0 +1,73 @@
+"""The verdict on every scenario of a sweep, in the words of the terminal, of files and of pages."""
+
+import math
+from collections.abc import Sequence
+
+from orchestrator.output.report.verdict_sentence import VerdictSentence
+from orchestrator.studies.sweep.axes import Axis, grid_places
+from orchestrator.studies.sweep.sweep import ScenarioSweep, SweepResult
+from orchestrator.studies.sweep.trajectories import GridPlace
+
+_TURNS = 3  # changes of stability along an axis that are named
+
+
+def verdicts(result: SweepResult) -> list[tuple[str, VerdictSentence]]:
+    """Each scenario's title with the verdict over all its points; an unstable one first."""
+    order = {False: 0, None: 1, True: 2}
+    axes = result.plan.axes
+    return [
+        (sweep.prepared.title, _verdict(sweep, axes))
+        for sweep in sorted(result.scenarios, key=lambda one: order[one.stable])
+    ]
+
+
+def _verdict(sweep: ScenarioSweep, axes: Sequence[Axis]) -> VerdictSentence:
+    total = math.prod(len(axis.values) for axis in axes)
+    places, known = sweep.unstable(axes), sweep.counts(axes)
+    rest = f" ({known[True]} stable, {known[None]} not known)" if known[None] else ""
+    if places:
+        worst = f"worst at {place_text(axes, places[0])}: {sweep.points[places[0]].because}"
+        at = f"at {len(places)} of {total} points{rest}; {worst}{_turns(sweep, axes)}"
+        return VerdictSentence(False, "UNSTABLE", at)
+    if sweep.stable is False:
+        between = f"between two points of the grid{rest}; take more points"
+        return VerdictSentence(False, "UNSTABLE", between)
+    if known[None]:
+        counted = f"{known[None]} of {total} points have no verdict, {known[True]} are stable, 0 are unstable"
+        return VerdictSentence(None, "not known", counted)
+    if sweep.stable is None:
+        between = "a point between those of the grid has no verdict"
+        return VerdictSentence(None, "not known", between)
+    return VerdictSentence(True, "stable", f"nothing grows at any of {total} points")
+
+
+def _turns(sweep: ScenarioSweep, axes: Sequence[Axis]) -> str:
+    """Between which neighbours of the only axis the verdict changes; "" of several axes."""
+    if len([axis for axis in axes if len(axis.values) > 1]) != 1:
+        return ""
+    places = sorted(
+        grid_places(axes),
+        key=lambda place: [float(a.values[int(i)]) for a, i in zip(axes, place, strict=True)],
+    )
+    words = {True: "stable", False: "unstable", None: "not known"}
+    found = [sweep.points[place].stability.get("stable") for place in places]
+    turns = [
+        f"{words[one]} at {place_text(axes, here)}, {words[other]} at {place_text(axes, there)}"
+        for here, there, one, other in zip(places, places[1:], found, found[1:], strict=False)
+        if one is not other
+    ]
+    more = f"; {len(turns) - _TURNS} more changes" if len(turns) > _TURNS else ""
+    return f"; {'; '.join(turns[:_TURNS])}{more}" if turns else ""
+
+
+def place_text(axes: Sequence[Axis], place: GridPlace) -> str:
+    """``grid.X_L = 0.1 pu``."""
+    return ", ".join(
+        f"{axis.key} = {value_text(axis.values[int(i)])} {axis.unit}".rstrip()
+        for axis, i in zip(axes, place, strict=True)
+    )
+
+
+def value_text(value: float | bool) -> str:
+    """A value of an axis as it is typed."""
+    return str(value).lower() if isinstance(value, bool) else f"{value:g}"
