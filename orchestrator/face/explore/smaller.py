@@ -4,6 +4,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 _DIGITS = 6  # significant ones of a number, as many as the page shows
+_OF_MODES = 10
+"""Significant digits of a mode's figures, which the page rounds to those of the command: twice rounded is wrong."""
+_FIGURES = ("real", "imag", "frequency_hz", "damping_percent")
 _OF_SHARES = 3  # significant digits of participations and shapes
 _STATES = 7  # of a mode's participation; the page has bars for eight at most
 _COMPONENTS = 6  # of a mode's participation
@@ -19,17 +22,16 @@ def smaller_answer(answer: Mapping[str, Any], flows: list[Any]) -> dict[str, Any
     added where it is not there yet: most sliders move none."""
     scenarios = [_smaller_scenario(one, flows) for one in answer["modes"]["scenarios"]]
     kept = {key: answer[key] for key in _OF_ANSWER if key in answer}
-    found: dict[str, Any] = rounded({**kept, "modes": {"scenarios": scenarios}})
-    return found
+    return {**rounded(kept), "modes": {"scenarios": scenarios}}
 
 
 def _smaller_scenario(one: Mapping[str, Any], flows: list[Any]) -> dict[str, Any]:
-    kept = {key: one[key] for key in _OF_SCENARIO if key in one}
+    kept = {key: one[key] for key in _OF_SCENARIO if key in one and key != "modes"}
     flow = rounded(one.get("power_flow"))
     if flow not in flows:
         flows.append(flow)
     modes = [_smaller_mode(mode) for mode in one["modes"]]
-    return {**kept, "modes": modes, "power_flow": flows.index(flow)}
+    return {**rounded(kept), "modes": modes, "power_flow": flows.index(flow)}
 
 
 def _smaller_mode(mode: Mapping[str, Any]) -> dict[str, Any]:
@@ -41,8 +43,9 @@ def _smaller_mode(mode: Mapping[str, Any]) -> dict[str, Any]:
         "components": dict(components[:_COMPONENTS]),
         "shape": [one for one in shape if one["magnitude"] > least],
     }
+    figures = {key: mode[key] for key in _FIGURES if key in mode}
     others = {key: one for key, one in mode.items() if key != _UNDRAWN}
-    return {**others, **rounded(drawn, _OF_SHARES)}
+    return {**rounded(others), **rounded(figures, _OF_MODES), **rounded(drawn, _OF_SHARES)}
 
 
 def rounded(content: Any, digits: int = _DIGITS) -> Any:

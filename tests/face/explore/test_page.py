@@ -249,13 +249,17 @@ def test_a_value_that_cannot_be_is_refused_at_its_control(view, capsys):
 def test_a_pinned_state_stays_beside_the_next_ones_and_the_address_holds_all(view, browser):
     view.locator("#pin").click()
     control = add(view, "grid.X_L")
-    control.locator('input[type="text"]').fill("0.3")
+    control.locator('input[type="text"]').fill("0.5")
     control.locator('input[type="text"]').press("Enter")
     computed(view, 2)
     assert view.locator("#map .pinned").count() >= 3
     assert "Δf from A" in view.locator("#table thead").inner_text()
     before = rows(view)
-    assert re.fullmatch(r"−?\d+\.\d+", before[0][2])
+    moved = {row[0]: row[2] for row in before if re.fullmatch(r"−?\d+\.\d+", row[2])}
+    # as `gfor sweep` follows them: 0.763 to 0.718 Hz, and 0.337 to 0.160 Hz, which has the other one's name by then
+    for begin, end in ((0.763, 0.718), (0.337, 0.160)):
+        (shift,) = [x for f, x in moved.items() if float(f) == pytest.approx(end, abs=2e-3)]
+        assert float(shift.replace("−", "-")) == pytest.approx(end - begin, abs=2e-3)
     with opened(browser, view.url) as other:  # a colleague's
         assert rows(other) == before
         assert other.locator('.control[data-name="grid.X_L"]').count() == 1

@@ -147,12 +147,16 @@ def test_a_cell_whose_middle_has_no_answer_is_not_interpolated():
 def test_a_smaller_answer_has_the_figures_that_are_shown():
     answer = answer_of(complex(-0.123456789, 3.0))
     (mode,) = answer["modes"]["scenarios"][0]["modes"]
+    mode["damping_percent"] = 17.595012345678
     mode["shape"] = [{"state": "a", "magnitude": 1.0}, {"state": "b", "magnitude": 0.001}]
     answer["modes"]["scenarios"][0]["power_flow"] = {"buses": [1.23456789]}
     flows = []
     first, second = (smaller_answer(copy.deepcopy(answer), flows) for _ in range(2))
     (kept,) = first["modes"]["scenarios"][0]["modes"]
-    assert (kept["real"], [one["state"] for one in kept["shape"]]) == (-0.123457, ["a"])
+    assert (kept["real"], [one["state"] for one in kept["shape"]]) == (-0.123456789, ["a"])
+    assert (
+        f"{kept['damping_percent']:.2f}" == "17.60"
+    )  # as the command says, and not 17.595 rounded again
     assert flows == [{"buses": [1.23457]}]
     assert [one["modes"]["scenarios"][0]["power_flow"] for one in (first, second)] == [0, 0]
 

@@ -90,17 +90,37 @@ function paintMap() {
 }
 const sentenceOf = m => `${m.name ? `${m.name}: ` : ""}${fixed(m.frequency_hz, 4)} Hz, damping ${fixed(m.damping_percent, 2)} %, ${fixed(m.real, 4)} 1/s; ${Object.entries(m.components).slice(0, 3).map(([c, x]) => `${c} ${fixed(100 * x, 0)} %`).join(", ")}`;
 
-// Of each mode, the one of A that is the same: by name, else the nearest that nobody else has.
+// Of each mode, the one of A that is the same; null where that is not clear.
 function pinnedPartners() {
   const pinned = seen.pinned?.modes.scenarios[0].modes;
   return pinned ? partnersIn(seen.modes, pinned) : [];
 }
+// A mode is recognised by who takes part in it and by its shape: eigenvalues move past each other, and a case's name may
+// fall on another mode. ALIKE: least likeness of a mode with itself elsewhere; APART: by how much any other is less like it.
+const ALIKE = 0.5, APART = 0.1, STATES = 7;
 function partnersIn(modes, others) {
-  const found = modes.map(m => (m.name && others.find(o => o.name === m.name)) || null), taken = new Set(found.filter(Boolean));
-  const pairs = [];
-  modes.forEach((m, k) => { if (!found[k]) others.forEach(o => { if (!taken.has(o) && !(m.name && o.name)) pairs.push([Math.hypot(m.real - o.real, m.imag - o.imag) / Math.hypot(m.real, m.imag), k, o]); }); });
-  for (const [apart, k, o] of pairs.sort((a, b) => a[0] - b[0])) if (apart < 0.6 && !found[k] && !taken.has(o)) { found[k] = o; taken.add(o); }
-  return found;
+  const alike = modes.map(m => others.map(o => likeness(m, o)));
+  return alike.map((row, k) => {
+    const most = Math.max(...row), j = row.indexOf(most);
+    const clear = row.every((x, i) => i === j || x < most - APART) && alike.every((r, i) => i === k || r[j] < most - APART);
+    return most >= ALIKE && clear ? others[j] : null;
+  });
+}
+// The part of the participation that two modes have in common, times the likeness of their shapes where machines swing.
+function likeness(one, other) {
+  const [p, q] = [one, other].map(m => Object.fromEntries(m.participation.slice(0, STATES).map(x => [x.state, x.factor])));
+  const sum = factors => Object.values(factors).reduce((all, x) => all + x, 0);
+  const common = Object.entries(p).reduce((all, [state, x]) => all + Math.min(x, q[state] ?? 0), 0) / Math.max(sum(p), sum(q), 1e-12);
+  return one.shape.length > 1 && other.shape.length > 1 ? common * likenessOfShapes(one.shape, other.shape) : common;
+}
+function likenessOfShapes(one, other) {
+  const size = shape => Math.sqrt(shape.reduce((all, s) => all + s.magnitude ** 2, 0));
+  let real = 0, imag = 0;
+  for (const s of one) for (const t of other.filter(t => t.state === s.state)) {
+    const angle = (s.angle_deg - t.angle_deg) * Math.PI / 180;
+    real += s.magnitude * t.magnitude * Math.cos(angle); imag += s.magnitude * t.magnitude * Math.sin(angle);
+  }
+  return Math.hypot(real, imag) / Math.max(size(one) * size(other), 1e-300);
 }
 
 function zoomMap(factor, real = (view.x0 + view.x1) / 2, hz = (view.y0 + view.y1) / 2) {

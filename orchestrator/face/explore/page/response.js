@@ -137,6 +137,7 @@ function nearestIn(times, t) {
   return t - times[low] <= times[high] - t ? low : high;
 }
 function beginResponse() {
+  for (const id of ["linear", "run"]) $(id).hidden = Boolean(SAVED);  // a saved page computes nothing
   $("signals").addEventListener("change", () => { state.signals = $("signals").value; keepState(); });
   $("linear").addEventListener("click", linearResponse);
   $("run").addEventListener("click", coSimulation);

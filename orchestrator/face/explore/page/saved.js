@@ -135,5 +135,7 @@ function askBest(name) {
   const show = make("button", {}, "show it");
   show.addEventListener("click", () => setSaved(name, best.value));
   const range = `${number(tried[0].value)} to ${number(tried.at(-1).value)}`;
+  const [most, now] = [best.answer, seen.answer].map(answer => fixed(leastDampingOf(answer), 2));
+  if (most === now) { sayElse(`None of ${tried.length} computed values of ${name} from ${range} damps more than the one that is shown, ${number(state.values[name] ?? ownOf(name))}, beyond the digits of ${now} %. `, stabilityOf(tried)); return; }
   sayElse(`Of ${tried.length} computed values of ${name} from ${range}, ${number(best.value)} damps most: ${swingOf(best.answer)}. `, stabilityOf(tried), show);
 }

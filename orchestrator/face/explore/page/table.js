@@ -57,6 +57,8 @@ function paintTable() {
     row.addEventListener("blur", () => highlight(null));
     return row;
   }));
+  table.caption?.remove();
+  if (seen.pinned) table.prepend(make("caption", { class: "soft" }, `Against A, a mode is recognised by who takes part in it and by its shape, not by its name${partners.includes(null) ? "; –: no mode of A is clearly the same" : ""}.`));
   if (focused !== undefined) table.querySelector(`tr[data-mode="${CSS.escape(focused)}"]`)?.focus({ preventScroll: true });
 }
 

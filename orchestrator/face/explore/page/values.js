@@ -89,7 +89,8 @@ function controlOf(name, mover = null) {
       box.append(mover ? make("details", { open: seen.unfolded === name ? "" : null }, make("summary", {}, "find a value"), finder) : finder);
     }
   }
-  const bounds = p && (p.minimum !== null || p.maximum !== null) ? `, from ${p.minimum === null ? "any" : number(p.minimum)} to ${p.maximum === null ? "any" : number(p.maximum)}` : "";
+  const held = SAVED?.grid[name];
+  const bounds = held ? `, computed from ${number(held[0])} to ${number(held.at(-1))}` : p && (p.minimum !== null || p.maximum !== null) ? `, from ${p.minimum === null ? "any" : number(p.minimum)} to ${p.maximum === null ? "any" : number(p.maximum)}` : "";
   if (mover) box.append(make("small", { class: "short", title: p?.description }, p?.description ?? ""));
   box.append(make("small", { hidden: mover ? "" : null }, p ? `${p.description}${p.description ? "; " : ""}${p.variability}${bounds}; ${number(original(name))} in the case` : "this scenario has no such parameter"), error);
   for (const off of (p?.switches ?? []).filter(one => (state.values[one] ?? original(one)) === false)) {
