@@ -55,7 +55,8 @@ class ProgressLines:
         """Return what is said now; while nothing is done since the line before, how long it takes is not guessed."""
         passed, (doing_now, part) = monotonic() - self._began, doing()
         if not self._total:
-            return f"{self._name}: preparing, {_in_words(passed)}"
+            which = f" {doing_now}" if doing_now else ""
+            return f"{self._name}: preparing{which}, {_in_words(passed)}"
         stored = self._stored or 0
         # of a task that is under way, some parts may be done; all are not before its record is there
         under_way = min(stored + parts_done(), self._total - 1)

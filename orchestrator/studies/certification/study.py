@@ -23,6 +23,7 @@ from orchestrator.studies.certification.request import CertificationRequest, rat
 from orchestrator.studies.points.executor import Executor
 from orchestrator.studies.points.points import CountReport, Work, nobody
 from orchestrator.studies.points.task import StudyCase
+from orchestrator.studies.points.under_way import tell_doing
 
 
 def certify(
@@ -33,9 +34,16 @@ def certify(
     controllers = damping_controllers(description, request)
     first = {"grid.X_L": request.reactances[0]}
 
-    def laid(place: Path) -> dict[str, PreparedScenario]:
-        case = write_case(request, controllers.settings, place)
-        return {name: case.prepare([name], first)[0] for name in (WITHOUT, WITH)}
+    def laid(place: Path, before: int) -> dict[str, PreparedScenario]:
+        case, found = (
+            write_case(request, controllers.settings, place),
+            dict[str, PreparedScenario](),
+        )
+        for k, name in enumerate((WITHOUT, WITH), start=before + 1):
+            tell_doing(f"scenario {name} of the code's case, {k} of 4; the first use builds models")
+            found[name] = case.prepare([name], first)[0]
+        tell_doing()
+        return found
 
     own = rated_frequency(request, NTS.f_n)
     if own != NTS.f_n:
@@ -52,8 +60,8 @@ def certify(
     with refusing(
         request, folder, "in the study's case that `gfor certify` makes from the request"
     ) as trial:
-        laid(trial)
-    prepared = laid(folder)
+        laid(trial, before=0)
+    prepared = laid(folder, before=2)
     tasks = tasks_of(prepared, request, controllers)
     work = Work.into(folder, executor, report)
     found = work.all(compute_point, tasks)

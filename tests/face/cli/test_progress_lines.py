@@ -126,6 +126,9 @@ def test_what_was_there_already_does_not_make_the_time_left_short(monkeypatch):
     monkeypatch.setattr(progress_lines, "monotonic", lambda: now[0])
     lines = ProgressLines("sweep", "points", shown=False)
     assert lines.line() == "sweep: preparing, 0 s"
+    tell_doing("scenario a, 1 of 4")
+    assert lines.line() == "sweep: preparing scenario a, 1 of 4, 0 s"
+    tell_doing()
     lines.report(6, 10)
     now[0] += 60.0
     assert lines.line() == "sweep: 6 of 10 points, 60 s"
