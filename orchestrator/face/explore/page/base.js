@@ -53,16 +53,23 @@ function showTip(event, text) {
 function hideTip() { $("tip").hidden = true; }
 
 // Texts beside their points, each where it covers nothing that came before it; what finds no place is left out.
+const FEW_POINTS = 150;  // up to which each text is compared with all points: beyond, a picture would wait for it
 function placedTexts(labels, taken, size, inside = { x0: -Infinity, y0: -Infinity, x1: Infinity, y1: Infinity }) {
   const boxes = [...taken], texts = [];
   const free = b => b.x0 >= inside.x0 && b.x1 <= inside.x1 && b.y0 >= inside.y0 && b.y1 <= inside.y1 && !boxes.some(o => o.x0 < b.x1 && b.x0 < o.x1 && o.y0 < b.y1 && b.y0 < o.y1);
   const ways = [[0.7, 0.7], [0.7, -0.7], [-0.7, 0.7], [-0.7, -0.7], [1, 0], [-1, 0], [0, 1], [0, -1]];
+  // a text nearer to another point than to its own reads as that one's; of flows, which have a size, nobody thinks so
+  const points = labels.filter(one => one.size === undefined), few = points.length <= FEW_POINTS;
+  const isOwn = (b, x, y) => {
+    const cx = (b.x0 + b.x1) / 2, cy = (b.y0 + b.y1) / 2, apart = Math.hypot(cx - x, cy - y);
+    return !few || points.every(o => (o.x === x && o.y === y) || Math.hypot(cx - o.x, cy - o.y) > apart);
+  };
   for (const { x, y, r, words, look, first } of labels) {
     const spots = words.flatMap(text => [...(first ? [first] : []), ...ways].map(([dx, dy]) => {
       const w = 0.6 * size * text.length, x0 = x + dx * r - (dx > 0.3 ? 0 : dx < -0.3 ? w : w / 2), y0 = y + dy * (r + size / 2) - size / 2;
       return { text, x0, y0, x1: x0 + w, y1: y0 + size };
     }));
-    const at = spots.find(free);
+    const at = spots.find(b => free(b) && isOwn(b, x, y)) ?? spots.find(free);
     if (!at) continue;
     boxes.push(at);
     const text = draw("text", { class: look, x: at.x0, y: at.y0 + 0.8 * size }, at.text);
