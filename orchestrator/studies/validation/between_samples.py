@@ -87,7 +87,7 @@ def _doubted(
     recording = event.recording
     doubt: Mapping[str, Numbers] = {name: np.zeros(len(recording.voltage)) for name in SIGNALS}
     for power in others:
-        signals = signals_of(power, recording.voltage)
+        signals = signals_of(recording, power)
         doubt = {
             name: np.maximum(
                 doubt[name], factor * np.abs(signals[name] - comparison.simulated[name])

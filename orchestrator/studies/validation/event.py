@@ -127,12 +127,12 @@ class EventComparison:
     @property
     def measured(self) -> dict[str, Numbers]:
         """The measured signals, by name [pu of the rating]."""
-        return signals_of(self.event.recording.power, self.event.recording.voltage)
+        return signals_of(self.event.recording, self.event.recording.power)
 
     @property
     def simulated(self) -> dict[str, Numbers]:
         """The device's signals, by name [pu of the rating]."""
-        return signals_of(self.played.power, self.event.recording.voltage)
+        return signals_of(self.event.recording, self.played.power)
 
 
 def prepare_event(
@@ -301,14 +301,14 @@ def compare_with(device: PlayedDevice, event: RecordedEvent) -> EventComparison:
 
 def judge_response(device: PlayedDevice, event: RecordedEvent, played: Played) -> EventComparison:
     recording, windows = event.recording, event.windows
-    measured = signals_of(recording.power, recording.voltage)
-    simulated = signals_of(played.power, recording.voltage)
+    measured = signals_of(recording, recording.power)
+    simulated = signals_of(recording, played.power)
     error = {name: simulated[name] - measured[name] for name in SIGNALS}
     noise = noise_before(event, played)
     errors = {}
     for name in windows.parts:
         of_signals = {
-            signal: errors_in(recording, error[signal], windows, name, noise[signal])
+            signal: errors_in(recording, error, windows, (name, signal), noise[signal])
             for signal in SIGNALS
         }
         errors[name] = {signal: one for signal, one in of_signals.items() if one is not None}
@@ -327,9 +327,9 @@ def judge_response(device: PlayedDevice, event: RecordedEvent, played: Played) -
 def noise_before(event: RecordedEvent, played: Played) -> dict[str, SignalNoise]:
     """The scatter of each signal's error before the event; of a device that was not at rest, the recording's alone."""
     recording = event.recording
-    scattering = signals_of(recording.power, recording.voltage)
+    scattering = signals_of(recording, recording.power)
     if played.still:
-        simulated = signals_of(played.power, recording.voltage)
+        simulated = signals_of(recording, played.power)
         scattering = {name: simulated[name] - scattering[name] for name in SIGNALS}
     return {name: noise_in(recording, scattering[name], event.windows) for name in SIGNALS}
 
@@ -403,7 +403,7 @@ def _over_limit(comparison: EventComparison) -> list[Question]:
     over, recording = comparison.played.over_limit, comparison.event.recording
     if over is None:
         return []
-    current = np.abs(recording.power[recording.good] / recording.voltage[recording.good])
+    current = np.abs(recording.current_of(recording.power)[recording.good])
     figures = {
         "at": recording.begin + over.begin,
         "length": over.length,

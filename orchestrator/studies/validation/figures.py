@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from orchestrator.core.arrays import Complex, Numbers
+from orchestrator.core.arrays import Complex, Numbers, rms
 from orchestrator.core.errors import CosimError
 from orchestrator.core.late import xr
 from orchestrator.linear.signals.identification import IdentifiedMode
@@ -25,6 +25,9 @@ from orchestrator.studies.validation.windows import Windows
 
 SIGNALS = ("p", "q", "i_p", "i_q")
 """Active and reactive power, active and reactive current, all in pu of the rating and into the grid."""
+
+CURRENTS = ("i_p", "i_q")
+_LEAST_VOLTAGE = 1e-3  # [pu] at which the noise of a current is that of a power a thousand times
 
 ModePair = tuple[IdentifiedMode | None, IdentifiedMode | None]
 """A mode of the measured signal and the same one of the simulated; None where there is none."""
@@ -66,6 +69,7 @@ class ErrorFigures:
     max_of_noise: float
     mean_of_noise: float
     mean_abs_of_noise: float
+    least_voltage: float = 1.0  # in the window [pu]
 
     def doubted(self, doubt: Numbers, *, of_mean: bool = True) -> ErrorFigures:
         """The same with a doubt of each sample's error counted as noise [pu].
@@ -184,9 +188,9 @@ def _mode_json(mode: IdentifiedMode | None) -> dict[str, object] | None:
     }
 
 
-def signals_of(power: Complex, voltage: Complex) -> dict[str, Numbers]:
-    """The compared signals, by name [pu of the rating]."""
-    current = power / np.maximum(np.abs(voltage), 1e-3)
+def signals_of(recording: Recording, power: Complex) -> dict[str, Numbers]:
+    """The compared signals of a power beside a recording's voltage, by name [pu of the rating]."""
+    current = recording.current_of(power)
     values = (power.real, power.imag, current.real, current.imag)
     return {name: np.asarray(x) for name, x in zip(SIGNALS, values, strict=True)}
 
@@ -206,23 +210,37 @@ def noise_in(recording: Recording, values: Numbers, windows: Windows) -> SignalN
 
 
 def errors_in(
-    recording: Recording, error: Numbers, windows: Windows, name: str, noise: SignalNoise
+    recording: Recording,
+    errors: Mapping[str, Numbers],
+    windows: Windows,
+    place: tuple[str, str],
+    noise: SignalNoise,
 ) -> ErrorFigures | None:
-    """Figures of one window; None without a sample in it."""
-    part = windows.part(name, recording.times) & recording.good
+    """Figures of one signal in one window; None without a sample in it.
+
+    ``place``: the window and the signal. The same noise of a power is a larger one of a current where the voltage is
+    lower."""
+    window, signal = place
+    part = windows.part(window, recording.times) & recording.good
     if not part.any():
         return None
-    inside, times = error[part], recording.times[part]
+    inside, times = errors[signal][part], recording.times[part]
     worst = int(np.abs(inside).argmax())
     independent = max(1.0, len(inside) / noise.together)
+    voltage = recording.magnitude[part]
+    grows = np.ones(len(inside))
+    if signal in CURRENTS:
+        before = recording.magnitude[windows.part("before", recording.times)].mean()
+        grows = before / np.maximum(voltage, _LEAST_VOLTAGE)
     return ErrorFigures(
         max_error=float(np.abs(inside).max()),
         max_at=recording.begin + float(times[worst]),
         mean_error=float(inside.mean()),
         mean_abs_error=float(np.abs(inside).mean()),
-        max_of_noise=largest_of_noise(noise, len(inside)),
-        mean_of_noise=2 * noise.scatter / float(np.sqrt(independent)),
-        mean_abs_of_noise=noise.scatter * float(np.sqrt(2 / np.pi)),
+        max_of_noise=float(grows.max()) * largest_of_noise(noise, len(inside)),
+        mean_of_noise=2 * rms(grows) * noise.scatter / float(np.sqrt(independent)),
+        mean_abs_of_noise=float(grows.mean()) * noise.scatter * float(np.sqrt(2 / np.pi)),
+        least_voltage=float(voltage.min()),
     )
 
 

@@ -15,6 +15,7 @@ from orchestrator.core.options import Option
 from orchestrator.core.toml_files import Table, fault_of, read_toml
 from orchestrator.studies.validation.event import EventComparison, JumpDoubt
 from orchestrator.studies.validation.figures import (
+    CURRENTS,
     ComparedMode,
     ErrorFigures,
     ModeLists,
@@ -24,6 +25,8 @@ from orchestrator.studies.validation.figures import (
 
 Signal = Literal["p", "q", "i_p", "i_q"]
 Window = Literal["before", "during", "after"]
+
+_NEAR_ZERO = 0.05  # voltage [pu] at which the noise of a current is that of a power twenty times
 
 EXAMPLE = Path(__file__).with_name("example_limits.toml")
 """Limits that were made up for this project: of no standard and no planner."""
@@ -68,6 +71,7 @@ class OpenCause(StrEnum):
     SAMPLES = "samples"
     STEP = "step"
     FIXED_STEP = "fixed step"
+    LOW_VOLTAGE = "low voltage"
     RING_DOWN = "ring-down"
     NO_FIGURE = "no figure"
     NO_SUCH_MODE = "no such mode"
@@ -187,7 +191,9 @@ def _of_windows(limits: LimitTables, comparison: EventComparison) -> Iterator[Cr
         for signal, limit in of_signals.items():
             figures = comparison.errors.get(window, {}).get(signal)
             if figures is not None:
-                yield from _of_errors(limit, figures, comparison, f"{window} {signal}")
+                found = _of_errors(limit, figures, comparison, f"{window} {signal}")
+                near_zero = signal in CURRENTS and figures.least_voltage < _NEAR_ZERO
+                yield from map(_open_by_voltage, found) if near_zero else found
 
 
 def _of_errors(
@@ -206,6 +212,13 @@ def _of_errors(
             yield Criterion(
                 label, f"{name} {key}", "pu", value, limit, noise=noise, verdict=verdict
             )
+
+
+def _open_by_voltage(one: Criterion) -> Criterion:
+    """The criterion of a current beside a voltage near zero, which is the reason if it is open."""
+    return replace(
+        one, why_open=OpenCause.LOW_VOLTAGE if one.verdict is LimitVerdict.OPEN else None
+    )
 
 
 def _of_delay(limits: LimitTables, comparison: EventComparison) -> Iterator[Criterion]:

@@ -9,7 +9,6 @@ import numpy as np
 
 from orchestrator.core.arrays import Complex
 from orchestrator.studies.validation.event import EventComparison, RecordedEvent, cut_event
-from orchestrator.studies.validation.figures import signals_of
 from orchestrator.studies.validation.questions import Question, QuestionKind
 
 _CROSSES = 0.005  # the model goes to both sides of zero by more [pu]
@@ -48,7 +47,7 @@ def _question_of(
 ) -> Iterator[Question]:
     recording = event.recording
     values = (recording.power, power, comparison.near_power(event))
-    seen, own, now = (signals_of(x, recording.voltage)[role][recording.good] for x in values)
+    seen, own, now = ((x.real if role == "p" else x.imag)[recording.good] for x in values)
     least = float(own.min())
     crosses = least < -_CROSSES and own.max() > _CROSSES
     if not crosses or seen.min() < _NEVER_BELOW * least:

@@ -31,10 +31,11 @@ def plant_loss(recording: Recording, windows: Windows) -> PlantLoss | None:
     """Find the loss of step of a plant; None where it stays in step, or no current tells."""
     width = max(1, round(_MEAN / recording.interval))
     first = max(1, int(windows.begin / recording.interval))
-    before = complex(recording.current[:first].mean())
+    seen = recording.current_of(recording.power)
+    before = complex(seen[:first].mean())
     if abs(before) < _LEAST_CURRENT or len(recording.voltage) < first + 2 * width:
         return None
-    current: Complex = np.convolve(recording.current, np.ones(width) / width, mode="same")
+    current: Complex = np.convolve(seen, np.ones(width) / width, mode="same")
     large = np.flatnonzero(np.abs(current) > _LEAST_CURRENT)
     turns = np.unwrap(np.angle(current[large] / before)) / (2 * np.pi)
     far = np.flatnonzero(np.abs(turns) > _LEAST_TURNS)

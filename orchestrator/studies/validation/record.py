@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,6 +35,7 @@ from orchestrator.studies.validation.transformer import AT_PORT, Between, Beyond
 if TYPE_CHECKING:
     import xarray as xr
 
+_LEAST_VOLTAGE = 1e-3  # [pu] by which a power is divided for its current
 _FEWEST = 20  # samples of a recording that can be compared with anything
 _LONGEST_GAP = 0.25  # gap [s] that a straight line bridges in the voltage that drives the device
 # gap [s] of P or Q beside a known voltage, from which on a swing's largest error may lie in it
@@ -120,10 +122,20 @@ class Recording:
     def length(self) -> float:
         return self.interval * (len(self.voltage) - 1)
 
-    @property
-    def current(self) -> Complex:
-        """Active current and reactive current [pu of the rating]: P/|v| + jQ/|v|."""
-        return np.asarray(self.power / np.maximum(np.abs(self.voltage), 1e-3))
+    @cached_property
+    def magnitude(self) -> Numbers:
+        """The voltage's magnitude, a mean over the same time as the power's [pu]."""
+        sizes: Complex = np.abs(self.voltage).astype(complex)
+        if self.ahead:
+            return sizes.real
+        return averaged(self.times, sizes, self.average, self.times).real
+
+    def current_of(self, power: Complex) -> Complex:
+        """Active and reactive current of a power beside this voltage [pu of the rating]: P/|v| + jQ/|v|.
+
+        Both are means over the same time: a mean that still holds the power before a fault, over the voltage within it,
+        would be a current that never flowed."""
+        return np.asarray(power / np.maximum(self.magnitude, _LEAST_VOLTAGE))
 
     def turned(self, hertz: float) -> Recording:
         """The same in a frame that rotates faster by ``hertz``."""

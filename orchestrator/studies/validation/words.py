@@ -345,6 +345,8 @@ _WHY_OPEN = {
     OpenCause.STEP: "the device sees a jump of the voltage only at the begin of its step",
     OpenCause.FIXED_STEP: "the device sees a jump of the voltage only at the begin of its step, and refuses a "
     "shorter one",
+    OpenCause.LOW_VOLTAGE: "the voltage is near zero there, and the noise of P and Q over it is a current by itself; "
+    "no option decides it, and limits of P and Q do",
     OpenCause.RING_DOWN: "seen from a little later on, or by a model of another order, the ring-down has another mode; "
     "no option decides it, and a recording that shows more of the swing may",
     OpenCause.NO_FIGURE: "the recording shows none",
