@@ -44,6 +44,8 @@ _EPOCH = 1e8  # numbers of seconds above it count from 1970, and are taken from 
 def read_table(path: Path) -> xr.Dataset:
     """Read signals; headings such as ``f north [Hz]``, or a row of units below the names, give names and units.
 
+    A heading as it is written stays the signal's ``long_name``.
+
     Lines above the headings, and columns without numbers, are left out."""
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; give the path of a recording")
@@ -84,11 +86,12 @@ def read_table(path: Path) -> xr.Dataset:
             f"{path}: several columns have the name {twice!r}; give each a name of its own"
         )
     columns = {
-        short: ("time", table[full].to_numpy(float), {"units": u})
+        short: ("time", table[full].to_numpy(float), {"units": u, "long_name": full})
         for full, (short, u) in found.items()
     }
     times = np.round(times - times[0], 6) if times[0] > _EPOCH else times
-    return xr.Dataset(columns, {"time": times, LINE_FREQUENCY: 0.0})
+    rows = ("time", times, {"long_name": first})
+    return xr.Dataset(columns, {"time": rows, LINE_FREQUENCY: 0.0})
 
 
 def _are_slow_frames(apart: float, times: Numbers) -> bool:

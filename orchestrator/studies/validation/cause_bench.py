@@ -102,6 +102,11 @@ class CauseBench:
             parts += [error.real / size, error.imag / size]
         return np.concatenate(parts)
 
+    def noise_alone(self) -> Explanation:
+        """The recordings' own noise as the cause of the error, which it is where that is hardly larger."""
+        left = np.array([self.noise])
+        return self.explanation(CauseKind.NOISE, "the recordings' own noise", None, 0.0, left)
+
     def explanation(
         self,
         cause: CauseKind,

@@ -29,7 +29,7 @@ once."""
 _TAKES = (
     1 / 3
 )  # part of the rms error that a likely cause takes away at least, whatever the scatter is
-_AS_GOOD = 1.05
+_AS_GOOD = 1.1
 """Times the least error left, up to which a position leads: a number has one freedom more, which wins it a little."""
 
 _MOST_DELAY = 0.25  # longest delay that is looked for [s]
@@ -55,6 +55,11 @@ class CauseKind(StrEnum):
     LIMIT = "limit"
     PAIR = "pair"
     LAG = "lag"
+    CLOCK = "clock"
+    NOISE = "noise"
+
+
+_WITHOUT_VALUES = {*CauseKind} - {CauseKind.VALUE, CauseKind.POSITION, CauseKind.PAIR}
 
 
 @dataclass(frozen=True)
@@ -74,6 +79,9 @@ class Explanation:
     beside: Mapping[str, float | bool] = field(default_factory=dict)  # others with their values
     beside_now: Mapping[str, float | bool] = field(default_factory=dict)  # of a pair, in the model
     outdone: bool = False  # whether another cause leaves clearly less
+    stands_in: bool = (
+        False  # whether it may only stand for a limit of the current that the model lacks
+    )
 
     @property
     def share(self) -> float:
@@ -87,7 +95,8 @@ class Explanation:
         """Return whether most of the error goes away with it, and no other cause leaves clearly less.
 
         Of an error that is hardly beyond the scatter, none does: a freedom more takes a little of any noise."""
-        return self.share >= EXPLAINS and not self.outdone and not self.hardly_beyond
+        ruled_out = self.outdone or self.stands_in or self.hardly_beyond
+        return self.share >= EXPLAINS and not ruled_out
 
     @property
     def hardly_beyond(self) -> bool:
@@ -107,8 +116,8 @@ class Explanation:
 
     @property
     def values(self) -> dict[str, float | bool]:
-        """Values with which a device has this cause; empty for a delay, a lag, and a limit that no parameter has."""
-        if self.cause in (CauseKind.DELAY, CauseKind.LIMIT, CauseKind.LAG):
+        """Values with which a device has this cause; empty for what no parameter has."""
+        if self.cause in _WITHOUT_VALUES:
             return {}
         return {self.name: self.value, **self.beside}
 
@@ -124,6 +133,15 @@ class Explanation:
         Positions of one kind are different causes, values of one number are not."""
         mine, its = ((x.cause, x.name, *x.beside) for x in (self, other))
         return mine == its and (self.cause is not CauseKind.POSITION or self.value == other.value)
+
+    @property
+    def is_position_alone(self) -> bool:
+        """Return whether it is another position of a switch or a kind, without a number beside it."""
+        return self.cause is CauseKind.POSITION and not self.beside
+
+    def leaves_less_than(self, best: Explanation) -> bool:
+        """Return whether it leaves less than the best cause before it: clearly less, where that is a position alone."""
+        return self.left < best.left / (_AS_GOOD if best.is_position_alone else 1.0)
 
     def is_beside(self, best: Explanation) -> bool:
         """Return whether the recordings hardly tell it apart from the cause that leaves the least."""
@@ -195,8 +213,7 @@ def without_worse_ways(causes: Sequence[Explanation]) -> list[Explanation]:
 def _simplest_first(causes: Sequence[Explanation]) -> list[Explanation]:
     """The causes, and first of them the position alone that leaves as little as the best does, where there is one."""
     for one in causes:
-        alone = one.cause is CauseKind.POSITION and not one.beside
-        if alone and one.left <= _AS_GOOD * causes[0].left:
+        if one.is_position_alone and one.left <= _AS_GOOD * causes[0].left:
             return [one, *(other for other in causes if other is not one)]
     return list(causes)
 

@@ -118,8 +118,12 @@ class RecordedChannel:
         ).as_text()
 
 
-def read_channel(text: str, columns: Iterable[str]) -> RecordedChannel:
-    """``p=-P_total in kW``: a role, a sign or factor, a column of these, and a unit."""
+def read_channel(
+    text: str, columns: Iterable[str], headings: Mapping[str, str] | None = None
+) -> RecordedChannel:
+    """``p=-P_total in kW``: a role, a sign or factor, a column of these, and a unit.
+
+    ``headings``: the columns by their headings as the file has them, such as ``P_total [kW]``."""
     role, sign, rest = (part.strip() for part in text.partition("="))
     if not sign or role not in ROLES:
         raise InputError(
@@ -127,15 +131,18 @@ def read_channel(text: str, columns: Iterable[str]) -> RecordedChannel:
             + f" {text}: write NAME=COLUMN with a name of {', '.join(ROLES)}, such as "
             "p=-P_total or 'angle=theta in rad'"
         )
-    known = list(columns)
+    known, of_heading = list(columns), headings or {}
+    rest = of_heading.get(rest, rest)
     whole, unit = rest, ""
     inner = _IN_UNIT.fullmatch(rest)
     if rest not in known and inner:
         whole, unit = inner["column"].strip(), inner["unit"]
+        whole = of_heading.get(whole, whole)
     if whole in known:
         return RecordedChannel(role, whole, 1.0, unit)
     found = _GIVEN.fullmatch(whole)
     column = found["column"].strip() if found else ""
+    column = of_heading.get(column, column)
     if not found or column not in known:
         raise InputError(
             Option.CHANNEL
@@ -155,7 +162,12 @@ def channels_in(
     Raises an `InputError` if the voltage or the power is missing, or several columns may be one of them; it names what
     could be meant."""
     columns = [str(name) for name in dataset.data_vars]
-    given_by = [read_channel(text, [*columns, "time"]) for text in given]
+    headings = {
+        str(variable.attrs["long_name"]): str(name)
+        for name, variable in dataset.variables.items()
+        if "long_name" in variable.attrs
+    }
+    given_by = [read_channel(text, [*columns, "time"], headings) for text in given]
     found = {channel.role: channel for channel in given_by}
     several = {}
     # a frequency that is given stands for an angle that is not

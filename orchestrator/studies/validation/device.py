@@ -118,6 +118,11 @@ class PlayedDevice:
     def with_values(self, values: Mapping[str, float | bool]) -> PlayedDevice:
         return replace(self, values={**self.values, **values})
 
+    @property
+    def rating_is_told(self) -> bool:
+        """Return whether the rating was given, or no other one can be: else it is the start value of its file."""
+        return "S_n" in self.values or "S_n" not in self.description.variables
+
     def value(self, name: str) -> float | bool:
         """A parameter's value with which it runs."""
         if name in self.values:

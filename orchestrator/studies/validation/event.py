@@ -58,6 +58,7 @@ Of 26 right models beside samples 1 ms apart none did; beside samples 5 ms apart
 _SUCH = 3  # times of a device that are named, which the samples do not show
 _SHORT_GAP = 0.02  # [s]: over a period voltages are means, and a gap hides little
 _IN_GAP = 0.3  # part of the largest change of the voltage, from which on a gap hides an event
+_SAME_SAMPLE = 1e-9  # [pu] by which samples of one recording differ that was read twice
 _FEWEST_BEFORE = 30  # samples before an event that a part of the recording keeps
 _ENDS = (
     QuestionKind.OUT_OF_STEP,
@@ -76,6 +77,16 @@ class RecordedEvent:
     windows: Windows
     start: OperatingStart
     questions: tuple[Question, ...] = ()
+
+    def same_as(self, other: RecordedEvent) -> bool:
+        """Return whether another recording holds the same samples, of which the same event is looked at."""
+        mine, its = self.recording, other.recording
+        if len(mine.voltage) != len(its.voltage) or self.windows.begin != other.windows.begin:
+            return False
+        return bool(
+            np.allclose(mine.voltage, its.voltage, rtol=0, atol=_SAME_SAMPLE)
+            and np.allclose(mine.power, its.power, rtol=0, atol=_SAME_SAMPLE)
+        )
 
 
 class JumpDoubt(StrEnum):
@@ -106,6 +117,11 @@ class EventComparison:
             of[signal] for name, of in self.errors.items() if name != "before" and signal in of
         ]
         return any(one.mean_abs_error > one.mean_abs_of_noise for one in found)
+
+    @property
+    def lacks_limit(self) -> bool:
+        """Return whether the model's current is above a limit that it does not represent."""
+        return any(one.kind is QuestionKind.OVER_LIMIT for one in self.questions)
 
     @property
     def largest_error(self) -> tuple[str, str, ErrorFigures]:
@@ -228,7 +244,20 @@ def _gaps(recording: Recording, windows: Windows) -> list[Question]:
             continue
         inside = begin - recording.interval <= windows.begin <= end
         if inside or _jump_within(voltage, low, high) > _IN_GAP * largest:
-            figures = {"length": end - begin, "at": recording.begin + begin}
+            figures = {"length": end - begin, "at": recording.begin + begin, "of_power": False}
+            return [Question(QuestionKind.GAP_AT_EVENT, figures)]
+    return _gaps_of_power(recording, windows)
+
+
+def _gaps_of_power(recording: Recording, windows: Windows) -> list[Question]:
+    """The gap of P or Q beside a known voltage that holds some of the window during the event."""
+    if not windows.seen or any(one.kind is QuestionKind.UNMEASURED for one in recording.questions):
+        return []
+    for low, high in runs_of(recording.driven & ~recording.good):
+        begin, end = (recording.interval * k for k in (low - 1, high))
+        is_short = end - begin <= _SHORT_GAP + 0.5 * recording.interval
+        if not is_short and begin < windows.end and end > windows.begin:
+            figures = {"length": end - begin, "at": recording.begin + begin, "of_power": True}
             return [Question(QuestionKind.GAP_AT_EVENT, figures)]
     return []
 

@@ -33,6 +33,7 @@ from orchestrator.studies.validation.causes import (
     Explanation,
     delay_of,
     later,
+    nothing_to_explain,
     without_worse_ways,
 )
 from orchestrator.studies.validation.device import PlayedDevice
@@ -71,6 +72,8 @@ def explain_errors(
     error, causes are tried while the device is held in step. Of long recordings the first seconds of the events with
     the largest errors are looked at. Ctrl-C leaves the causes that were found until then."""
     found = _search(device, in_step or events, report, far=in_step is None)
+    if nothing_to_explain(found.causes):
+        return found
     enough = found.explains and found.causes[0].left <= _MUCH * _movement(events)
     if enough or not found.finished or not _misses_much(device, events):
         return found
@@ -125,7 +128,8 @@ def _search(
             found.append(replace(one, error=min(one.error, most)))
     except KeyboardInterrupt:
         finished = False
-    better = sorted((one for one in found if one.left < one.error), key=lambda one: one.left)
+    kept = (one for one in found if one.left < one.error or one.cause is CauseKind.NOISE)
+    better = sorted(kept, key=lambda one: one.left)
     return CauseSearch(without_worse_ways(better), finished, held=device.gives_way)
 
 
@@ -139,6 +143,10 @@ def _causes(
     explains, and the last for limits alone."""
     looked_at = _looked_at(device, events)
     bench = CauseBench(device, looked_at, report)
+    noise = bench.noise_alone()
+    if nothing_to_explain([noise]):
+        yield noise
+        return
     rough = bench if device.rough is device else CauseBench(device.rough, looked_at, report)
     told = explained = False
     best: Explanation | None = None  # of those with which the device can be run
@@ -146,7 +154,7 @@ def _causes(
     def seen(causes: Iterator[Explanation]) -> Iterator[Explanation]:
         nonlocal told, explained, best
         for one in causes:
-            if one.values and (best is None or one.left < best.left):
+            if one.values and (best is None or one.leaves_less_than(best)):
                 best = one
             explained = explained or one.explains
             told = told or (one.explains and not one.leaves_much)

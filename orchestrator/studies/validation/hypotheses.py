@@ -58,6 +58,10 @@ _BASES_AWAY = (
     0.4,
     2.5,
 )  # how far a ratio of movements may be from the base: the device starts elsewhere
+_RATINGS_AWAY = (
+    1.5,
+    20.0,
+)  # times by which a rating is off that is asked about: less is a wrong reactance as well
 _NEAR_PREFIX = 0.1  # part by which a factor may miss one of ten and be it
 _CURRENTS = ("ia", "ib", "ic")
 _FRAMES_LEAVE = 0.8  # part of the error that the frequency may leave for which the phasors speak
@@ -109,6 +113,7 @@ class Reading:
     swaps: bool = False  # its two channels change their places
     turns: int = 0  # its three channels do, each by so many places
     unit: str = ""  # that says so, in place of the factor
+    rating: float = 0.0  # of the device, that says so [MVA]
 
     def fits(self, recording: Recording) -> bool:
         """Return whether a recording may be meant so: it has the channels, in the unit."""
@@ -120,6 +125,8 @@ class Reading:
     def remedy(self, recording: Recording) -> list[str]:
         """Return what ``--channel`` takes to read the recording so."""
         channels = recording.channels
+        if self.rating:
+            return [f"{Option.SET} S_n={self.rating:g}"]
         if self.swaps:
             first, second = self.roles
             return [channels[second].taken_for(first), channels[first].taken_for(second)]
@@ -224,8 +231,9 @@ def question_readings(comparison: EventComparison, bases: PortBases) -> list[Que
     explained = [
         *lost_jump(comparison),
         *_clock(comparison, whole),
-        *ask_of_lag(comparison),
     ]
+    if not comparison.lacks_limit:  # whose part a lag would play
+        explained += ask_of_lag(comparison)
     if whole > max(_LEAST_OFF, _OFF_ELSEWHERE * math.hypot(*moved)):
         explained += _meter_elsewhere(comparison, bases, whole)
     if whole > _LEAST_OFF and _is_off_later(comparison):
@@ -331,6 +339,7 @@ def _scalings(comparison: EventComparison) -> Iterator[Reading]:
     own: Complex = (comparison.played.power - comparison.played.rest)[part]
     both = np.concatenate([way.real, way.imag]), np.concatenate([own.real, own.imag])
     yield from _per_unit(comparison, _ratio(*both))
+    yield from _of_rating(comparison, _ratio(*both))
     factor = _whole_factor(*both)
     if factor:
         change = _power(factor, factor)
@@ -352,6 +361,19 @@ def _per_unit(comparison: EventComparison, ratio: float) -> Iterator[Reading]:
             said, change = f"P and Q are in per unit of {name}", _power(base, base)
             unit = "pu" if base == rating else ""
             yield Reading(said, ("p", "q"), base, change, leaves=_LEAVES, unit=unit)
+
+
+def _of_rating(comparison: EventComparison, ratio: float) -> Iterator[Reading]:
+    """P and Q of a plant of another rating, if the device has its own from its file alone."""
+    device = comparison.device
+    away = max(ratio, 1 / ratio) if ratio > 0 else 0.0
+    if device.rating_is_told or not _RATINGS_AWAY[0] < away < _RATINGS_AWAY[1]:
+        return
+    rating = float(f"{device.rating / ratio:.3g}")
+    factor = device.rating / rating
+    said = f"is the plant's rating {rating:g} MVA, and not the {device.rating:g} MVA of the model's file"
+    change = _power(factor, factor)
+    yield Reading(said, ("p", "q"), factor, change, leaves=_LEAVES_ALONE, rating=rating)
 
 
 def _scale_name(which: str, factor: float) -> str:
@@ -442,7 +464,7 @@ def _trials_of(
     device: PlayedDevice, event: RecordedEvent, reading: Reading, bases: PortBases
 ) -> Iterator[_Trial]:
     """A device's answer to a recording that is read otherwise; nothing where it cannot start so."""
-    with device.trials.trial(reading.name):
+    with device.trials.trial(reading.name, of_reading=True):
         changed = prepare_event(reading.change(event.recording), bases, event.windows)
         yield _Trial(reading, changed, device.play(changed.recording, changed.start).power)
 
@@ -472,7 +494,9 @@ def _meters_beyond(
     part = near.recording.good & (near.recording.times > near.windows.begin)
     here: Complex = (comparison.near_power(near) - near.recording.power)[part]
     left = math.inf
-    with device.trials.trial(f"a transformer between port and meters{_which(beyond)}"):
+    with device.trials.trial(
+        f"a transformer between port and meters{_which(beyond)}", of_reading=True
+    ):
         way = misses(near, _TRIED_REACTANCE) - here
         size = float(np.sum(np.abs(way) ** 2))
         times = -float(np.real(np.vdot(way, here))) / size if size > 0 else 0.0
@@ -506,7 +530,7 @@ def _time_unit(comparison: EventComparison, bases: PortBases, error: float) -> I
             continue  # 1000 samples a second are no 16.67 of minutes
         timed = replace(whole, interval=interval, begin=seconds * whole.begin)
         left, moved = math.inf, 0.0
-        with comparison.device.trials.trial(f"times in {unit}"):
+        with comparison.device.trials.trial(f"times in {unit}", of_reading=True):
             event = prepare_event(at_port(timed, AT_PORT), bases)
             near = cut_event(event, _AFTER, _BEFORE)
             power = comparison.device.play(near.recording, near.start).power
@@ -535,7 +559,7 @@ def _rated_otherwise(comparison: EventComparison, error: float) -> Iterator[tupl
     left = math.inf
     spoken_for = grid_of_frames(event.recording) == hertz
     leaves = _FRAMES_LEAVE if spoken_for else _LEAVES_ALONE
-    with device.trials.trial(f"f_n = {hertz:g}"):
+    with device.trials.trial(f"f_n = {hertz:g}", of_reading=True):
         power = other.play(near.recording, near.start).power
         if math.hypot(*rms_error(power, near)) > max(_LEAVES, leaves) * here:
             return

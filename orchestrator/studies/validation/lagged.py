@@ -24,7 +24,8 @@ _PART = 0.05  # part of a signal's movement by which it is off at least
 _TO_NOISE = (
     1.5  # times the scatter before the event, which a lag leaves that explains all of an error
 )
-_NEARLY_ALL = 0.1  # part of the error that it leaves then at most
+_LEAVES = {CauseKind.LAG: 0.1, CauseKind.CLOCK: 0.25}
+"""Part of the error that it leaves then at most: a lag has a shape to choose, and a delay has none."""
 _ALIKE = (
     0.1  # part by which the lags of several recordings differ at most, of one recorder or plant
 )
@@ -48,42 +49,48 @@ def ask_of_lag(comparison: EventComparison) -> Iterator[tuple[float, Question]]:
 
 
 def lag_alone(comparisons: Sequence[EventComparison]) -> Explanation | None:
-    """The lag that explains every event to the recording's noise, as a cause; None where there is more, or none.
+    """The lag or delay that explains every event to the recording's noise, as a cause; None if there is more, or none.
 
     A parameter acts in loops, and P or Q are not behind their own by it to the noise."""
     found = [
         one
         for comparison in comparisons
         for question in comparison.questions
-        if question.kind is QuestionKind.LAGGED
         for one in _as_cause(comparison, question)
     ]
     if not found or len(found) < len(comparisons):
         return None
     first = max(found, key=lambda one: one.error)
     same = all(
-        one.name == first.name and abs(one.value - first.value) <= _ALIKE * first.value
+        one.name == first.name and abs(one.value - first.value) <= _ALIKE * abs(first.value)
         for one in found
     )
     return first if same else None
 
 
 def _as_cause(comparison: EventComparison, question: Question) -> Iterator[Explanation]:
-    """The lag that a question names, where it leaves noise alone, and no other signal is off."""
-    signals: list[str] = question.figures["signals"]
+    """The lag or delay that a question names, where it leaves noise alone, and no other signal is off."""
+    match question.kind:
+        case QuestionKind.LAGGED:
+            kind, signals = CauseKind.LAG, list(question.figures["signals"])
+            value = float(question.figures["lag"])
+        case QuestionKind.CLOCKS:
+            kind, signals = CauseKind.CLOCK, question.figures["which"].lower().split(" and ")
+            value = float(question.figures["delay"])
+        case _:
+            return
     noise = math.hypot(*(comparison.noise[name].scatter for name in signals))
     error, left = float(question.figures["error"]), float(question.figures["left"])
     others = [name for name in ("p", "q") if name not in signals]
-    explained = left <= min(_TO_NOISE * noise, _NEARLY_ALL * error)
+    explained = left <= min(_TO_NOISE * noise, _LEAVES[kind] * error)
     if explained and not any(_is_off(comparison, name) for name in others):
         which = " and ".join(name.upper() for name in signals)
-        lag = float(question.figures["lag"])
         yield Explanation(
-            CauseKind.LAG,
-            f"lag of {which}",
+            kind,
+            f"{'lag' if kind is CauseKind.LAG else 'delay'} of {which}",
             "s",
             now=0.0,
-            value=lag,
+            value=value,
             error=error,
             left=left,
             noise=noise,

@@ -73,6 +73,7 @@ class OpenCause(StrEnum):
     FIXED_STEP = "fixed step"
     LOW_VOLTAGE = "low voltage"
     RING_DOWN = "ring-down"
+    FEW_PERIODS = "few periods"
     NO_FIGURE = "no figure"
     NO_SUCH_MODE = "no such mode"
 
@@ -81,8 +82,9 @@ class OpenCause(StrEnum):
 class Criterion:
     """One figure beside its limit; ``noise``: what the recording's scatter alone may make of the figure.
 
-    ``why_open``: None where it is met or not. ``rings``: the strong modes of a ring-down that stays open; ``mode_hz``:
-    the frequency of the plant's mode that is off the most, where several are compared."""
+    ``why_open``: None where it is met or not. ``rings``: the strong modes of a ring-down that stays open;
+    ``doubts``: those of the mode; ``mode_hz``: the frequency of the plant's mode that is off the most, where several
+    are compared."""
 
     recording: str
     name: str
@@ -94,6 +96,7 @@ class Criterion:
     device: str = ""
     why_open: OpenCause | None = None
     rings: ModeLists = ((), ())
+    doubts: Sequence[str] = ()
     mode_hz: float | None = None
 
     @property
@@ -118,6 +121,7 @@ class Criterion:
             "verdict": str(self.verdict),
             "why_open": None if self.why_open is None else str(self.why_open),
             "mode_hz": self.mode_hz,
+            "doubts": list(self.doubts),
         }
 
 
@@ -280,6 +284,10 @@ def _of_mode(place: Criterion, compared: ComparedMode, k: int) -> Criterion:
     if apart is None:
         return replace(place, why_open=OpenCause.NO_SUCH_MODE)
     value, noise = abs(apart[k]), compared.doubt[k]
+    if compared.few_periods:
+        few = f"{compared.modes[0].frequency_hz:.3g} Hz: {compared.few_periods}"
+        place = replace(place, why_open=OpenCause.FEW_PERIODS, doubts=[few])
+        return replace(place, value=value, noise=noise)
     verdict = _verdict(value, noise, place.limit, grows=False)
     why = OpenCause.RING_DOWN if verdict is LimitVerdict.OPEN else None
     return replace(place, value=value, noise=noise, verdict=verdict, why_open=why)

@@ -159,7 +159,9 @@ def _tried(
     of, smoothing = smoothed
     lost = smoothing.lost(of.values(recording.voltage), recording.interval)
     part = min(1.0, _SMALL / max(float(np.abs(lost).max()), _SMALL))
-    with device.trials.trial(f"{of.name} smoothed over {1000 * smoothing.length:g} ms"):
+    with device.trials.trial(
+        f"{of.name} smoothed over {1000 * smoothing.length:g} ms", of_reading=True
+    ):
         moves = (device.play(_sharper(recording, of, part * lost), near.start).power - base) / part
         off = recording.power - base
         good = recording.good

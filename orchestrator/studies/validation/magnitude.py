@@ -37,7 +37,8 @@ def _from_the_other_side(comparison: EventComparison, role: str) -> Iterator[Que
     near = cut_event(comparison.event, _AFTER, _BEFORE)
     power = near.start.power
     turned = power.conjugate() if role == "q" else -power.conjugate()
-    with comparison.device.trials.trial(f"{role.upper()} of the other sign before the event"):
+    tried = f"{role.upper()} of the other sign before the event"
+    with comparison.device.trials.trial(tried, of_reading=True):
         played = comparison.device.play(near.recording, replace(near.start, power=turned))
         yield from _question_of(near, role, played.power, comparison)
 

@@ -30,6 +30,7 @@ from orchestrator.studies.validation.words import (
     interval_head,
     lasting_sentence,
     open_sentence,
+    rating_words,
     sentence,
     untold_words,
     worst_of,
@@ -90,7 +91,7 @@ def _model_table(device: PlayedDevice) -> str:
         ["File", escape(device.path.name)],
         ["SHA-256", file_hash(device.path) or ""],
         ["Model", escape(device.description.model_name)],
-        ["Rating", f"{device.rating:g} MVA, {device.rated_hz:g} Hz"],
+        ["Rating", f"{rating_words(device)}; {device.rated_hz:g} Hz"],
         ["Communication step", f"{1e6 * device.step_size:g} µs"],
     ]
     rows += [[escape(name), escape(str(value))] for name, value in device.values.items()]
@@ -221,7 +222,11 @@ def _not_judged(result: ValidationResult) -> str:
         texts.append("No parameter was fitted.")
     if not result.request.explain:
         texts.append("No cause of the errors was looked for.")
-    texts += [f"Tried, and it did not run: {one.tried} ({one.reason})." for one in result.refused]
+    texts += [
+        f"Tried, and it did not run: {one.tried} ({one.reason})."
+        for one in result.refused
+        if one.matters
+    ]
     return bullet_list(texts)
 
 

@@ -52,6 +52,7 @@ _FASTEST_PHASOR = (
     0.0021  # interval [s] below which samples of an angle may be unwrapped at any time
 )
 _VOLTAGES_KV = (0.4, 0.69, 10, 20, 33, 66, 110, 132, 150, 220, 230, 275, 345, 380, 400, 500, 525)
+_LIKELY = (0.3, 1.6)  # magnitude of a voltage [pu], or it is in another unit
 _NORMAL = (0.8, 1.2)  # magnitude of the voltage before the event [pu] that is not asked about
 _MOST_LOADED = 1.3  # apparent power before the event [pu of the rating] that is not asked about
 _LEAST_LOADED = 0.01  # the same that a plant feeds at least
@@ -413,7 +414,14 @@ class _Reading:
         values, base = self._values(role)
         channel = self.channels[role]
         typical = float(np.nanmedian(np.abs(values)))
-        if not base and not 0.3 < typical < 1.6:
+        of_rated = typical / (self.bases.kilovolt * peak) if self.bases.kilovolt else 0.0
+        if (
+            not base
+            and not _LIKELY[0] < typical < _LIKELY[1]
+            and _LIKELY[0] < of_rated < _LIKELY[1]
+        ):
+            base = "kV"  # the rated voltage was given in it, and the values are near that
+        if not base and not _LIKELY[0] < typical < _LIKELY[1]:
             raise InputError(
                 f"{self.label}: {channel.column!r} says no unit, and is about {typical:.4g}; "
                 "give it, as in " + Option.CHANNEL + f" '{channel.changed(unit='kV')}'"
@@ -545,7 +553,10 @@ def _evened(reading: _Reading, voltage: Complex, power: Complex) -> Recording:
         figures = {"count": stale, "of": len(even), "at": at, "longest": longest, "columns": alone}
         reading.ask(QuestionKind.FILLED, **figures)
     elif missing:
-        reading.ask(QuestionKind.MISSING, count=missing, of=len(even), longest=longest)
+        of_power = bool(drives.all())
+        longest = (high - low) * interval if of_power else longest
+        figures = {"count": missing, "of": len(even), "longest": longest, "of_power": of_power}
+        reading.ask(QuestionKind.MISSING, **figures)
     recording = Recording(
         label=reading.label,
         begin=float(times[0]),

@@ -137,6 +137,11 @@ def _slow_samples(x: Figures) -> str:
 
 
 def _missing(x: Figures) -> str:
+    if x["of_power"]:
+        return (
+            f"P or Q is missing in {x['count']} of {x['of']} samples, for up to {x['longest']:.3g} s, where the "
+            "voltage is known: they are not compared"
+        )
     return (
         f"{x['count']} of {x['of']} samples are missing, for up to {x['longest']:.3g} s: they are bridged in the "
         "voltage and not compared"
@@ -169,6 +174,11 @@ def _filled(x: Figures) -> str:
 
 
 def _gap_at_event(x: Figures) -> str:
+    if x["of_power"]:
+        return (
+            f"P or Q is missing for {x['length']:.3g} s from {x['at']:.4g} s on, during the event: what the plant did "
+            "there is not known, and the event is not judged. Give a recording without the gap, or another event"
+        )
     return (
         f"samples are missing for {x['length']:.3g} s from {x['at']:.4g} s on, where the voltage changes: what drove "
         "the plant there is not known, and the event is not judged. Give a recording without the gap, or another event"
@@ -266,7 +276,8 @@ def _lagged(x: Figures) -> str:
 
 
 def _read_otherwise(x: Figures) -> str:
-    given = " ".join(map(_channel, x["remedy"]))
+    options = (one if one.startswith("--") else _channel(one) for one in x["remedy"])
+    given = " ".join(options)
     return f"{x['reading']}? Read so, {fall_of_error(x)}. If it is so, give {given}"
 
 

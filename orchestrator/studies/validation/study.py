@@ -175,9 +175,31 @@ def events_of(request: ValidationRequest) -> list[RecordedEvent]:
     each: Sequence[tuple[float, float] | None]
     alone = given[0] if given else None
     each = given if len(given) > 1 else [alone] * len(request.recordings)
-    return [
+    events = [
         _event(request, one, window) for one, window in zip(request.recordings, each, strict=True)
     ]
+    _refuse_twice(request, events)
+    return events
+
+
+def _refuse_twice(request: ValidationRequest, events: Sequence[RecordedEvent]) -> None:
+    """Refuse an event that is given twice: it would count twice in a fit, or confirm itself."""
+    both = list(zip(events, request.recordings, strict=True))
+    for k, (event, given) in enumerate(both):
+        for other, first in both[:k]:
+            if not event.same_as(other):
+                continue
+            if given.held_back != first.held_back:
+                kept, fitted = (given, first) if given.held_back else (first, given)
+                raise InputError(
+                    Option.HOLD_BACK
+                    + f" {kept.label}: it holds the same samples and the same event as {fitted.label}, which is "
+                    "fitted, and confirms nothing; give a recording of another event"
+                )
+            raise InputError(
+                f"{given.label}: it holds the same samples and the same event as {first.label}, and would count twice; "
+                "give each recording once"
+            )
 
 
 def _event(
@@ -218,9 +240,11 @@ def _validate(request: ValidationRequest, report: Report) -> ValidationResult:
         search = _search_causes(request.device, result.comparisons, report)
         answered = _without_explained(request.device, result.comparisons, search)
         result = add_verdict(replace(result, comparisons=answered))
+        lacking = any(one.lacks_limit for one in comparisons)
+        causes = [replace(c, stands_in=lacking and c.leaves_much) for c in search.causes]
         result = replace(
             result,
-            explanations=search.causes,
+            explanations=causes,
             explained_in_step=search.held,
             interrupted=not search.finished,
         )

@@ -17,11 +17,14 @@ class RefusedTrial:
     tried: str
     kind: ErrorKind
     reason: str
+    of_reading: bool = False  # of the recording, and no value of the device
 
     @property
-    def began(self) -> bool:
-        """Return whether the device began at all: an operating point that it does not take is no trial of it."""
-        return self.kind is not ErrorKind.INPUT
+    def matters(self) -> bool:
+        """Return whether a search may have missed something by it.
+
+        A reading of which the device does not take the operating point is refuted by that."""
+        return self.kind is not ErrorKind.INPUT and not self.of_reading
 
     def as_json(self) -> dict[str, Any]:
         return {"tried": self.tried, "kind": str(self.kind), "reason": self.reason}
@@ -38,7 +41,7 @@ class TrialLog:
         return tuple(self._by_name.values())
 
     @contextmanager
-    def trial(self, tried: str) -> Iterator[None]:
+    def trial(self, tried: str, *, of_reading: bool = False) -> Iterator[None]:
         """Go on behind ``with`` if the device does not run inside, and note why.
 
         A file that cannot be used ends every trial, and so does whoever interrupts; neither is passed over."""
@@ -47,8 +50,8 @@ class TrialLog:
         except (FmuFileError, RunInterruptedError):
             raise
         except CosimError as error:
-            self.note(tried, error)
+            self.note(tried, error, of_reading=of_reading)
 
-    def note(self, tried: str, error: CosimError) -> None:
+    def note(self, tried: str, error: CosimError, *, of_reading: bool = False) -> None:
         """Note what did not run; of several of one name the first."""
-        self._by_name.setdefault(tried, RefusedTrial(tried, error.kind, str(error)))
+        self._by_name.setdefault(tried, RefusedTrial(tried, error.kind, str(error), of_reading))

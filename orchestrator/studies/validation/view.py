@@ -21,6 +21,7 @@ from orchestrator.output.report.terminal_tables import PlainTable, make_table
 from orchestrator.output.report.verdict_sentence import VerdictSentence
 from orchestrator.output.results.file_writers import save_json, save_table
 from orchestrator.output.results.staging import new_run_id, staged
+from orchestrator.studies.signals.signal_modes import doubt_text
 from orchestrator.studies.validation.causes import nothing_to_explain
 from orchestrator.studies.validation.event import EventComparison
 from orchestrator.studies.validation.fit import Fit
@@ -43,6 +44,7 @@ from orchestrator.studies.validation.words import (
     interval_head,
     lasting_sentence,
     open_sentence,
+    rating_words,
     refused_sentence,
     sentence,
     swing_cell,
@@ -264,8 +266,9 @@ def parts(found: Validation) -> Iterator[RenderableType]:
     yield from _differences(result)
     yield _answer(found)
     yield _events_table(result)
-    for one in result.comparisons:
-        yield _windows_table(one)
+    yield from _doubted_modes(result)
+    for one in _of_both(result):
+        yield _windows_table(one, by_device=bool(result.others))
     if result.others:
         yield beside_table(result)
     if result.criteria:
@@ -291,16 +294,9 @@ def parts(found: Validation) -> Iterator[RenderableType]:
         )
     elif result.request.fit and result.interrupted:
         yield "Interrupted before a fit had any values: the figures above are of the recordings alone."
-    begun = [one for one in result.refused if one.began]
-    if begun and _is_doubted(result):
-        yield escape(refused_sentence(begun))
-
-
-def _is_doubted(result: ValidationResult) -> bool:
-    """Return whether a trial that did not run may matter: one of a search or a fit, or while a question is open."""
-    asked = [question for one in result.comparisons for question in one.questions]
-    searched = result.request.explain or bool(result.request.fit)
-    return searched or any(question.keeps_open for question in asked)
+    refused = [one for one in result.refused if one.matters]
+    if refused and (result.request.explain or result.request.fit):
+        yield escape(refused_sentence(refused))
 
 
 def _differences(result: ValidationResult) -> Iterator[str]:
@@ -312,7 +308,7 @@ def _differences(result: ValidationResult) -> Iterator[str]:
 
 def _answer(found: Validation) -> str:
     result = found.result
-    of_both = [*result.comparisons, *result.others]
+    of_both = _of_both(result)
     name = worst_of(of_both).device.name
     says = error_sentence(of_both)
     if result.verdict is None:
@@ -327,8 +323,26 @@ def _answer(found: Validation) -> str:
     return VerdictSentence(_GOOD[result.verdict], word, says).markup(name)
 
 
+def _of_both(result: ValidationResult) -> list[EventComparison]:
+    """The comparisons of the model, and of the other one of the plant where there is one, recording by recording."""
+    if not result.others:
+        return list(result.comparisons)
+    pairs = zip(result.comparisons, result.others, strict=True)
+    return [one for pair in pairs for one in pair]
+
+
+def _doubted_modes(result: ValidationResult) -> Iterator[str]:
+    """Yield why a mode that the table marks is in doubt."""
+    for one in result.comparisons:
+        measured = [mode.modes[0] for mode in one.signals["p"].compared_modes]
+        doubted = [mode for mode in measured if mode.doubts]
+        if doubted:
+            texts = "; ".join(map(doubt_text, doubted))
+            yield escape(f"? {one.event.recording.label}: {texts}.")
+
+
 def _events_table(result: ValidationResult) -> PlainTable:
-    columns = (
+    columns: tuple[str, ...] = (
         "Recording",
         "Event [s]",
         "P, Q before [pu]",
@@ -339,14 +353,18 @@ def _events_table(result: ValidationResult) -> PlainTable:
         "Model rings",
     )
     rows = []
-    for one in result.comparisons:
+    if result.others:
+        columns = (columns[0], "Model", *columns[1:])
+    for one in _of_both(result):
         label = one.event.recording.label
+        model = [one.device.name] if result.others else []
         _, signal, figures = one.largest_error
         windows, begin, power = one.event.windows, one.event.recording.begin, one.event.start.power
         compared = one.signals["p"].compared_modes
         rows.append(
             (
                 label,
+                *model,
                 f"{begin + windows.begin:.4g} to {begin + windows.end:.4g}",
                 f"{power.real:.3f}, {power.imag:.3f}",
                 f"{figures.max_error:.4f} of {signal.upper()}",
@@ -359,12 +377,17 @@ def _events_table(result: ValidationResult) -> PlainTable:
 
 
 def _rings(modes: Sequence[IdentifiedMode | None]) -> str:
-    """Frequency and damping of each strong mode, one a line; a dash where there is none."""
-    lines = [f"{m.frequency_hz:.3g} Hz, {m.damping_percent:.3g} %" if m else "–" for m in modes]
+    """Frequency and damping of each strong mode, one a line, with a mark if it is in doubt; a dash if there is none."""
+    lines = ["–" if one is None else _ring(one) for one in modes]
     return "\n".join(lines) or "–"
 
 
-def _windows_table(one: EventComparison) -> PlainTable:
+def _ring(mode: IdentifiedMode) -> str:
+    mark = " ?" if mode.doubts else ""
+    return f"{mode.frequency_hz:.3g} Hz, {mode.damping_percent:.3g} %{mark}"
+
+
+def _windows_table(one: EventComparison, *, by_device: bool) -> PlainTable:
     columns: tuple[str, ...] = ("Window", "from [s]", "to [s]")
     columns += tuple(
         f"{s.upper()} {what}" for s in _POWERS for what in ("largest", "mean", "mean |e|")
@@ -378,9 +401,8 @@ def _windows_table(one: EventComparison) -> PlainTable:
             for value in (of[signal].max_error, of[signal].mean_error, of[signal].mean_abs_error)
         ]
         rows.append((name, f"{begin + low:.4g}", f"{begin + high:.4g}", *figures))
-    title = (
-        f"{one.event.recording.label}: simulated less measured [pu of {one.device.rating:g} MVA]"
-    )
+    place = one.event.recording.label + (f", {one.device.name}" if by_device else "")
+    title = f"{place}: simulated less measured [pu of {rating_words(one.device)}]"
     return make_table(title, *columns, rows=rows)
 
 

@@ -333,6 +333,12 @@ def _off(swing: PlantSwing) -> str:
     return f"up to {part:.0%} of the {swing.largest:.3g} pu that the plant swings ({rms_part:.0%} in the mean)"
 
 
+def rating_words(device: PlayedDevice) -> str:
+    """The rating, and from where it is if nobody gave it."""
+    own = "" if device.rating_is_told else ", the start value of its file's S_n"
+    return f"{device.rating:g} MVA{own}"
+
+
 def swing_cell(comparison: EventComparison) -> str:
     """The rms errors of P and Q as parts of the plant's own swing; a dash where it has none."""
     parts = [one.rms_part for one in swings_of(comparison).values()]
@@ -349,7 +355,8 @@ _WHY_OPEN = {
     "no option decides it, and limits of P and Q do",
     OpenCause.RING_DOWN: "seen from a little later on, or by a model of another order, the ring-down has another mode; "
     "no option decides it, and a recording that shows more of the swing may",
-    OpenCause.NO_FIGURE: "the recording shows none",
+    OpenCause.FEW_PERIODS: "the recording holds too little of the swing",
+    OpenCause.NO_FIGURE: "the recording shows none, or no shift of it fits the model",
     OpenCause.NO_SUCH_MODE: "the plant rings with a mode that the model does not show",
 }
 
@@ -361,16 +368,32 @@ def open_sentence(criteria: Sequence[Criterion], devices: Sequence[PlayedDevice]
         return ""
     said = []
     for cause in OpenCause:
-        names = dict.fromkeys(one.shown_name for one in left if one.why_open is cause)
-        if not names:
+        own = [one for one in left if one.why_open is cause]
+        if not own:
             continue
+        names = _names_by_place(own, criteria)
         hint = ""
         if cause is OpenCause.STEP:
             hint = "; give " + Option.STEP + f" '{_finer_step(devices):g} us'"
-        hint += "".join(dict.fromkeys(_rings(one) for one in left if one.why_open is cause))
-        said.append(f"{', '.join(names)} ({_WHY_OPEN[cause]}{hint})")
+        if cause is OpenCause.FEW_PERIODS:
+            doubts = dict.fromkeys(text for one in own for text in one.doubts)
+            hint += f": {'; '.join(doubts)}"
+        hint += "".join(dict.fromkeys(map(_rings, own)))
+        said.append(f"{names} ({_WHY_OPEN[cause]}{hint})")
     met = sum(one.verdict is LimitVerdict.MET for one in criteria)
     return f"{met} of {len(criteria)} limits are met, and these stay open: {'; '.join(said)}"
+
+
+def _names_by_place(own: Sequence[Criterion], criteria: Sequence[Criterion]) -> str:
+    """The names of criteria; with the recording and the model where there are several of those."""
+    several = len({one.recording for one in criteria}) > 1
+    models = len({one.device for one in criteria}) > 1
+    by_place: dict[str, dict[str, None]] = {}
+    for one in own:
+        shown = one.place if models else one.recording
+        place = f" of {shown}" if several or models else ""
+        by_place.setdefault(place, {})[one.shown_name] = None
+    return ", ".join(f"{', '.join(names)}{place}" for place, names in by_place.items())
 
 
 def _rings(one: Criterion) -> str:
@@ -440,6 +463,8 @@ def explanation_cells(one: Explanation) -> tuple[str, ...]:
 def _likely(one: Explanation) -> str:
     if one.outdone:
         return "no: another leaves clearly less"
+    if one.stands_in:
+        return "no: the model lacks a limit"
     if one.hardly_beyond:
         return "no: the error is hardly more than noise"
     return "yes" if one.explains else "no"
@@ -514,10 +539,16 @@ def _said_of_causes(explanations: Sequence[Explanation], *, finished: bool, in_s
     if not explanations:
         return "No cause that was tried leaves less of the error."
     best = explanations[0]
-    if best.cause is CauseKind.LAG:
+    if best.cause in (CauseKind.LAG, CauseKind.CLOCK):
         return (
             f"The likeliest cause is {_cause(best)}: it explains {best.share:.0%} of the squared error beyond the "
             "recording's own noise, and no parameter was tried beside it."
+        )
+    if best.stands_in:
+        return (
+            "No cause is named: the model's current is above a limit that it lacks, as the note says, and values only "
+            f"stand in for that limit. The nearest is {_cause(best)}, with {best.share:.0%} of the squared error "
+            "beyond the recording's own noise. Give the EMT model, or a recording of a smaller event."
         )
     if not best.explains:
         return (
@@ -601,6 +632,10 @@ def _cause(one: Explanation) -> str:
         case CauseKind.LAG:
             which = one.name.removeprefix("lag of ")
             return f"{which} behind a lag of {1000 * one.value:.3g} ms, which the question above asks about"
+        case CauseKind.CLOCK:
+            way = "later" if one.value > 0 else "earlier"
+            which = one.name.removeprefix("delay of ")
+            return f"{which} coming {1000 * abs(one.value):.3g} ms {way}, which the question above asks about"
         case CauseKind.PAIR:
             others = [
                 f" together with {name} = {value_text(x)} (now {value_text(one.beside_now[name])})"

@@ -92,6 +92,6 @@ def test_neither_an_interrupt_nor_a_defect_nor_a_broken_file_is_taken_for_a_refu
             raise ComponentError("device", "fmi2DoStep", status, "too large", 0.1)
     (refused,) = log.refused
     assert (refused.tried, refused.kind) == ("a value", ErrorKind.FMU)
-    assert refused.began
-    assert not replace(refused, kind=ErrorKind.INPUT).began
+    assert refused.matters
+    assert not replace(refused, kind=ErrorKind.INPUT).matters
     assert "fmi2DoStep returned fmi2Error: too large" in refused.reason

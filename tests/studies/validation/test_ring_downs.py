@@ -11,6 +11,7 @@ from orchestrator.studies.validation.figures import compare_signals, modes_apart
 from orchestrator.studies.validation.limits import (
     LimitTables,
     LimitVerdict,
+    OpenCause,
     RingDownLimits,
     _of_ring_down,
     _verdict,
@@ -21,15 +22,15 @@ from orchestrator.studies.validation.windows import Windows
 from orchestrator.studies.validation.words import open_sentence, sentence
 
 INTERVAL = 0.02  # of a recorder that sends 50 samples a second [s]
-LENGTH = 8.0  # [s]
+LENGTH = 12.0  # [s]: three periods of the slowest swing, of which fewer decide nothing
 EVENT = Windows(begin=1.0, end=1.1, length=LENGTH)
 TIMES = INTERVAL * np.arange(round(LENGTH / INTERVAL) + 1)
 LIMIT = 3.0  # of the example's limits on damping [points of percent]
 
 
-def rings(*modes):
+def rings(*modes, late=0.0):
     """A sum of damped swings from the event on; each with frequency [Hz], damping [1] and amplitude [pu]."""
-    since = np.maximum(TIMES - EVENT.begin, 0.0)
+    since = np.maximum(TIMES - EVENT.begin - late, 0.0)
     found = np.zeros(len(TIMES))
     for frequency, damping, amplitude in modes:
         decay = 2 * np.pi * frequency * damping / np.sqrt(1 - damping**2)
@@ -280,3 +281,26 @@ def test_a_gap_before_the_event_and_one_after_a_second_leave_a_ring_down_whole()
     until = replace(EVENT, second=5.5)
     assert without_gaps(recorded(rings(), before), EVENT) == EVENT
     assert without_gaps(recorded(rings(), late), until) == until
+
+
+@pytest.mark.parametrize("points", [0, 8])
+def test_a_swing_of_few_periods_is_doubted_and_decides_nothing(points):
+    """Ten seconds and a half hold two periods."""
+    plant = scattering(rings((0.2, 0.10, 0.04)), 2e-4, seed=1)
+    model = scattering(rings((0.2, 0.10 + points / 100, 0.04)), 1e-4, seed=2)
+    found = criterion(plant, model)
+    assert (found.verdict, found.why_open) == (LimitVerdict.OPEN, OpenCause.FEW_PERIODS)
+    assert "0.2 Hz: the ring-down has 2.1 periods of it" in said(plant, model)
+    assert any(one.doubts for one in compared(plant, model).modes)
+
+
+@pytest.mark.parametrize("late", [0.0, 0.06])
+def test_a_delay_is_told_of_shapes_that_fit_and_of_no_others(late):
+    def delay(measured, simulated, windows=EVENT):
+        return compare_signals(recorded(measured), simulated, windows)["p"].delay
+
+    one = (0.76, 0.10, 0.04)
+    plant = scattering(rings(one, late=late), 2e-4, seed=1)
+    assert delay(plant, rings(one)) == pytest.approx(late, abs=0.5 * INTERVAL)
+    assert delay(plant, rings((0.4, 0.10, 0.04))) is None
+    assert delay(plant, rings(one), replace(EVENT, seen=False)) is None
