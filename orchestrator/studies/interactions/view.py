@@ -460,15 +460,16 @@ def _page(found: Interactions) -> str:
         )
     title = f"{plan.case.table.title or plan.case.name}: interactions"
     kind = f"{plan.prepared.title}, {len(plan.vendors)} vendors at {len(plan.places)} places"
-    names, findings = plan.prepared.names, paragraphs(found.stable, found.sentences)
+    names = plan.prepared.names
+    findings = f'<div class="findings">{paragraphs(found.stable, found.sentences)}</div>'
     return document(title, kind, findings, content, names=names)
 
 
 def _pairs(judgement: JudgedInteractions, figures: Figures) -> str:
     vendors = judgement.result.plan.vendors
     text = (
-        "Least damping [%] of each vendor alone, on the diagonal, and of each pair; "
-        f"{stand_in_sentence(judgement)}. U: unstable; ?: not known."
+        "Least damping [%] of each vendor alone, on the diagonal, and of each pair. "
+        "U: unstable; ?: not known."
     )
     cells = [[_together(judgement, row, column) for column in vendors] for row in vendors]
     picture = _heat_picture("Least damping of vendors alone and in pairs", vendors, cells)

@@ -214,7 +214,8 @@ def _page(result: MachineSites) -> str:
     title = f"{result.case.table.title or result.case.name}: machines as places of a POD"
     lines = "".join(f"<li>{escape(text)}</li>" for text in (*sureness(result), *remarks(result)))
     shade = "good" if result.agrees and result.confirmations else "soft"
-    findings = f'<div class="findings"><p class="{shade}">{escape(answer(result))}</p><ul>{lines}</ul></div>'
+    verdict = f'<p class="verdict"><b class="{shade}">{escape(answer(result))}</b></p>'
+    findings = f'<div class="findings">{verdict}<ul class="soft">{lines}</ul></div>'
     content = [("All machines", _table_of(result, UNIT, result.ranking).html())]
     kind, names = f"{result.prepared.title}; code {code_hash()[:12]}", result.prepared.names
     return document(title, kind, findings, content, names=names)

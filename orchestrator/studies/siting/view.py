@@ -145,7 +145,8 @@ def answer_in_parts(result: SiteResult) -> tuple[str, str]:
     among = " of those asked for" if result.request.buses else ""
     if result.by_coupled:
         return _best_confirmed(result, among)
-    others = ", ".join(f"{bus} {100 * result.least(bus)[0] / most:.0f} %" for bus in best[1:])
+    parts = [f"{bus} {100 * result.least(bus)[0] / most:.0f} %" for bus in best[1:]]
+    others = ", ".join([*(f"{part} of that" for part in parts[:1]), *parts[1:]])
     tried = [one for one in result.confirmations if one.bus == best[0] and not one.failure]
     then = "".join(f"{_doubt(one)}; as it is now, {with_it(one)}" for one in tried)
     moved = result.shifts[DEVICE][at][mode.label][best[0]]
@@ -158,7 +159,7 @@ def answer_in_parts(result: SiteResult) -> tuple[str, str]:
     return (
         f"{best[0]} {is_place}: {shift_text(result, most)} "
         f"{unit(result, '100')}, for the least damped mode{after} ({_called(mode)}){then}",
-        f"; of that {others}" if others else "",
+        f"; elsewhere less: {others}" if others else "",
     )
 
 

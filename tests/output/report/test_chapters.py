@@ -5,19 +5,27 @@ import re
 import shutil
 import warnings
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import xarray as xr
 
 from orchestrator.core.errors import InputError
-from orchestrator.output.report.html.chapters.files import chapters_of
+from orchestrator.output.report.html.chapters.devices import of_strengths
+from orchestrator.output.report.html.chapters.files import _without_answer, chapters_of
 from orchestrator.output.report.html.chapters.runs import of_run
-from orchestrator.output.report.html.chapters.studies import of_screening, of_site, of_sweep
-from orchestrator.output.report.html.elements import with_units_held
+from orchestrator.output.report.html.chapters.studies import (
+    _without_derivative,
+    of_screening,
+    of_site,
+    of_sweep,
+)
+from orchestrator.output.report.html.elements import table, with_units_held
 from orchestrator.output.report.html.first_page import first_page
 from orchestrator.output.report.html.least_damped import LeastDamped
 from orchestrator.output.report.html.page import _PICTURE, _with_first_picture_above, write_report
+from orchestrator.output.report.html.sections import findings
 from orchestrator.output.results import origin
 from orchestrator.output.results.manifest import ResultsWarning, read_manifest, write_manifest
 from orchestrator.studies.sweep.limit import Ending, ParameterLimit, Until
@@ -248,18 +256,18 @@ def test_the_first_page_answers_every_study(folders, tmp_path):
         "1.2 pu at X_L = 0.1",
         "sg1.omega differs most, by 0.5 pu at 1.200 s",
         "two modes are close",
-        "strongest: 0.923 Hz, 5.20 %",
+        "strongest oscillation: 0.923 Hz, 5.20 %",
         "what are its loads?",
         "is H meant?",
         "no governor?",
-        "0.900 Hz, 4.20 %: most by gfor.b (-0.2), gfor.a (+0.01) points for 1 % more",
+        "0.900 Hz, 4.20 %: most by gfor.b (−0.2), gfor.a (+0.01) points for 1 % more",
         "it holds no steady state",
         "0.923 Hz: it is at the window's edge".replace("'", "&#x27;"),
         "beyond its rating: gfor",
         "0.800 Hz: forced, from sg2; 1.100 Hz: not known",
         "1.100 Hz: too short",
         "a gap",
-        "base, pod: weakest is bus_2 with 400 MVA, SCR 3.00 at bus_1",
+        "weakest is bus_2 with 400 MVA, SCR 3.00 at bus_1 (base, pod)",
     ):
         assert said in first
     assert 'class="bad">not as required' in first
@@ -689,9 +697,80 @@ def test_the_first_picture_is_told_once_by_its_number():
     above, (section,) = _with_first_picture_above(numbered)
     assert above == f'<figure id="figure-1">{picture}</figure>'
     assert section == ("A", '<a href="#figure-1">Figure 1</a>.')
-    above, (section,) = _with_first_picture_above([("B", f"<p>{picture}</p>")])
+    map_alone = f'<section><h3>Map</h3><figure id="figure-1">{picture}</figure></section><p>all</p>'
+    assert _with_first_picture_above([("C", map_alone)])[1] == [("C", "<p>all</p>")]
+    above, (section, _) = _with_first_picture_above([("B", f"<p>{picture}</p>"), ("D", "")])
     assert above == picture
     assert "stands at the top" in section[1]
+    assert _with_first_picture_above([("B", picture)])[1] == [("B", "")]  # nobody else's picture
+
+
+@pytest.mark.parametrize(
+    ("cells", "is_text"),
+    [
+        (["sg3 43%", "sg4 33%"], True),
+        (["", "the window has 1.2 periods", ""], True),
+        (['<b class="bad">UNSTABLE</b>', "stable"], True),
+        (["17.51", "–", "not known"], False),
+        (["0.473 Hz, 17.51 %", "−0.9"], False),
+        (["", ""], False),
+    ],
+)
+def test_words_stand_left_and_figures_right(cells, is_text):
+    text = table("Modes", ["Mode", "What"], [["a", cell] for cell in cells])
+    assert text.count("<td class=text>") == len(cells) * (1 + is_text)
+
+
+def test_what_all_stable_rows_have_in_common_is_told_once(tmp_path):
+    calm = "keeps synchronism and settles by 20 s"
+    remarks = {"p": f"{calm}; sg1 alone", "q": calm, "base": f"{calm}; grows"}
+    scenarios = [
+        {"name": name, "answer": (SHAKY if name == "base" else CALM) | {"remark": remark}}
+        for name, remark in remarks.items()
+    ]
+    text = first_page([of_run(tmp_path, scenarios)])
+    rows = re.findall(r'<span class="remark">(.*?)</span>', text)
+    assert rows == ["sg1 alone", "", f"{calm}; grows"]
+    assert f"<p>Each stable one: {calm}.</p>" in text
+    bare = first_page([of_run(tmp_path, [{"name": "p", "answer": CALM}])])
+    assert ">Remark<" not in bare
+
+
+def test_networks_that_are_equally_strong_have_one_table(tmp_path):
+    """Five scenarios of two networks once had five tables, and a scenario's name lost its letters: ``Pss``."""
+    bus = {"bus": "bus_8", "s_sc_mva": 2165.0, "scr": None}
+    weak = bus | {"s_sc_mva": 2127.0, "scr": 6.91}
+    found = [("pss", bus), ("no_pss", bus), ("gfor", weak)]
+    scenarios = [{"name": name, "buses": [one]} for name, one in found]
+    chapter = of_strengths(tmp_path / "scr.json", {"scenarios": scenarios, "convention": "c = 1"})
+    captions = re.findall("<caption>(.*?)</caption>", chapter.content)
+    assert captions == ["Short-circuit power: pss, no_pss", "Short-circuit power: gfor"]
+    assert chapter.answer == (
+        "weakest is bus_8 with 2165 MVA (pss, no_pss); "
+        "weakest is bus_8 with 2127 MVA, SCR 6.91 at bus_8 (gfor)"
+    )
+
+
+def test_parameters_without_a_derivative_are_told_by_their_reason():
+    rows = [("a", "no steady state"), ("b", ""), ("c", "no steady state"), ("d", "discrete")]
+    told = _without_derivative([{"parameter": name, "reason": why} for name, why in rows])
+    assert told == ["a, c: no steady state", "d: discrete"]
+
+
+def test_a_chapter_from_a_page_leaves_out_the_verdict_that_was_told():
+    page = '<p class="verdict"><b>bus_1 &lt; bus_2</b></p><p>rest</p>'
+    assert _without_answer(page, "bus_1 < bus_2; elsewhere less") == "<p>rest</p>"
+    assert _without_answer(page, "another") == page
+
+
+def test_what_the_first_page_did_not_judge_is_not_told_again():
+    finding = {"kind": "not_judged", "message": "whether x < y settles"}
+    run = SimpleNamespace(
+        ended_early=None,
+        scenarios=[{"title": "Base", "failure": None, "findings": [finding], "warnings": []}],
+    )
+    assert "whether x &lt; y settles" in findings(run)
+    assert findings(run, above="Base: whether x &lt; y settles") == ""
 
 
 def test_an_answer_that_begins_with_a_name_keeps_its_letters(tmp_path):

@@ -19,8 +19,11 @@ def table(
     left: int = 1,
     texts: Sequence[bool] = (),
 ) -> str:
-    """A table of a page: the ``left`` first columns hold text, and those further ones of which ``texts`` says so."""
+    """A table of a page: the ``left`` first columns hold text, and those further ones of which ``texts`` says so or
+    most of whose cells begin with a letter."""
+    rows = list(rows)
     of_text = {*range(left), *(k for k, is_text in enumerate(texts) if is_text)}
+    of_text |= {k for k, column in enumerate(zip(*rows, strict=False)) if _is_text(column)}
 
     def cells(tag: str, values: Sequence[str]) -> str:
         return "".join(
@@ -34,6 +37,12 @@ def table(
         f'<div class="scroll"><table><caption>{escape(caption)}</caption><thead><tr>{head}</tr></thead>'
         f"<tbody>{body}</tbody></table></div>"
     )
+
+
+def _is_text(cells: Sequence[str]) -> bool:
+    """Tell a column of words and names from one of figures, of which some may be missing."""
+    filled = [text for text in (_TAG.sub("", cell).strip() for cell in cells) if text]
+    return 2 * sum(text[0].isalpha() for text in filled) > len(filled)
 
 
 def bullet_list(texts: Iterable[str]) -> str:
@@ -61,7 +70,12 @@ def held_data(name: str, data: Any) -> str:
 
 
 def number(value: float, digits: int) -> str:
-    return f"{value:.{digits}f}".replace("-", "−")
+    return with_minus(f"{value:.{digits}f}")
+
+
+def with_minus(text: str) -> str:
+    """Write a figure's sign, and that of its power of ten, as a minus."""
+    return text.replace("-", "−")
 
 
 def eigenvalue(real: float, imag: float) -> str:

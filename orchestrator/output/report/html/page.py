@@ -31,6 +31,8 @@ USED = (
 )
 """Commands whose results a report takes."""
 
+_EMPTY_HEADING = re.compile(r"<section[^>]*><h3>[^<]*</h3></section>")
+
 Sections = list[tuple[str, str]]
 Answer = Mapping[str, Any]
 _PICTURE = (
@@ -91,7 +93,8 @@ def page(
     case = runs[0].case if runs else None
     title = title or (case.table.title or case.name if case else _title_of(places, headings))
     kind = "Small-signal and time-domain study by co-simulation of FMUs"
-    found = "".join(map(sections.findings, runs))
+    first = first_page(chapters, title)
+    found = "".join(sections.findings(run, above=first) for run in runs)
     of_all = {
         "question": "Are these results of one study?",
         "source": "",
@@ -100,7 +103,7 @@ def page(
     # for `changes` of a later page
     answers = held_data("answers", [*[of_all] * bool(differ), *_answers(chapters)])
     above = "".join(paragraphs(False, [text]) for text in (differ, changed) if text)
-    findings = above + first_page(chapters, title) + picture + found + answers
+    findings = above + first + picture + found + answers
     return document(title, kind, findings, content, names=_names_of(chapters, runs))
 
 
@@ -114,8 +117,11 @@ def _with_first_picture_above(content: Sections) -> tuple[str, Sections]:
     picture = first[0]
     numbered = re.search(f"<figure id=[^>]*>{re.escape(picture)}</figure>", first.string)
     moved = numbered[0] if numbered else picture
-    left = "" if numbered else "<p>Its picture stands at the top of this page.</p>"
-    return moved, [(heading, text.replace(moved, left)) for heading, text in content]
+    alone = len(content) == 1
+    left = "" if numbered or alone else "<p>Its picture stands at the top of this page.</p>"
+    return moved, [
+        (heading, _EMPTY_HEADING.sub("", text.replace(moved, left))) for heading, text in content
+    ]
 
 
 def _title_of(places: Sequence[Path], headings: Sequence[str]) -> str:

@@ -56,8 +56,9 @@ def scenario_legend(results: Results, circles: str = "") -> str:
     return legend(((s["title"], colour(k)) for k, s in enumerate(results.scenarios)), circles)
 
 
-def findings(results: Results) -> str:
-    """Return what a reader in a hurry should take away, from the figures themselves."""
+def findings(results: Results, above: str = "") -> str:
+    """Return what a reader in a hurry should take away, from the figures themselves; ``above``: what the page has told
+    before, and does not tell again."""
     items = []
     early = results.ended_early
     if early:
@@ -77,7 +78,7 @@ def findings(results: Results) -> str:
             f"{escape(_KINDS.get(f['kind'], f['kind']))}</span>: "
             f"{escape(f['message'])}"
             for f in s.get("findings", [])
-            if f["message"] != s["failure"]
+            if f["message"] != s["failure"] and escape(f["message"]) not in above
         ]
     warnings = "".join(
         f'<div class="warning"><b>{escape(s["title"])}:</b> {escape(text)}</div>'

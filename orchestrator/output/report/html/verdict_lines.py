@@ -17,6 +17,12 @@ _WORST_FIRST: Mapping[bool | None, int] = {False: 0, None: 1, True: 2}
 _NAMES_IN_A_SENTENCE = 2
 """So many scenarios of one verdict are named in the sentence; more are counted: the lines below name all."""
 
+_SEVERAL = 2
+"""From so many stable scenarios on, what their remarks share is said once."""
+
+_BETWEEN = "; "
+"""Stands between the parts of a remark."""
+
 _NONE = "–"
 
 
@@ -77,22 +83,42 @@ def _figures(mode: LeastDamped) -> str:
 
 
 def verdicts(lines: Sequence[VerdictLine]) -> str:
-    """Return the sentence over all scenarios and the table of their lines, as a page has them."""
+    """Return the sentence over all scenarios and the table of their lines, as a page has them.
+
+    What the remarks on all stable scenarios have in common stands once below the table."""
+    shared = _shared_remarks(lines)
     columns = ["Scenario", "Verdict", "Least damped"]
     after = any(line.after for line in lines)
     in_time = any(line.in_time for line in lines)
     columns += ["After the events"] if after else []
     columns += ["In the run"] if in_time else []
-    columns.append("Remark")
+    remarks = [_remark_without(shared, line) for line in lines]
+    remarked = any(remarks)
+    columns += ["Remark"] if remarked else []
     rows = []
-    for line in lines:
+    for line, remark in zip(lines, remarks, strict=True):
         row = [escape(line.scenario), _in_colour(line.verdict, line.stable)]
         row.append(_cell(line.least))
         row += [_cell(line.after)] if after else []
         row += [_cell(line.in_time)] if in_time else []
-        row.append(f'<span class="remark">{escape(line.remark)}</span>')
+        row += [f'<span class="remark">{escape(remark)}</span>'] if remarked else []
         rows.append(row)
-    return f'<p class="verdict">{_sentence(lines)}</p>{table("Verdicts", columns, rows, left=2)}'
+    below = f"<p>Each stable one: {escape('; '.join(shared))}.</p>" if shared else ""
+    return f'<p class="verdict">{_sentence(lines)}</p>{table("Verdicts", columns, rows, left=2)}{below}'
+
+
+def _shared_remarks(lines: Sequence[VerdictLine]) -> list[str]:
+    """List the parts that the remarks on all stable scenarios have in common, where these are several."""
+    stable = [line.remark.split(_BETWEEN) for line in lines if line.stable]
+    if len(stable) < _SEVERAL:
+        return []
+    return [part for part in stable[0] if part and all(part in parts for parts in stable[1:])]
+
+
+def _remark_without(shared: Sequence[str], line: VerdictLine) -> str:
+    parts = line.remark.split(_BETWEEN)
+    left = [part for part in parts if part not in shared] if line.stable else parts
+    return _BETWEEN.join(left)
 
 
 def _cell(mode: LeastDamped | None) -> str:

@@ -94,15 +94,19 @@ def _unjudged(checks: Sequence[Content]) -> list[str]:
 
 def of_strengths(file: Path, c: Content) -> Chapter:
     said = dict[str, list[str]]()
-    content = ""
+    tables = dict[str, list[str]]()  # the scenarios that have the same figures at all buses
     for scenario in c["scenarios"]:
         weakest, *_ = buses = sorted(scenario["buses"], key=lambda b: b["s_sc_mva"])
         ratios = {b["bus"]: b["scr"] for b in buses if b["scr"] is not None}
         text = "".join(f", SCR {scr:.2f} at {bus}" for bus, scr in ratios.items())
         text = f"weakest is {weakest['bus']} with {weakest['s_sc_mva']:.0f} MVA{text}"
         said.setdefault(short(text, _LONGEST), []).append(scenario["name"])
-        content += strength_table(f"Short-circuit power: {scenario['name']}", buses).html()
-    answer = "; ".join(f"{', '.join(names)}: {text}" for text, names in said.items())
+        tables.setdefault(strength_table("{}", buses).html(), []).append(scenario["name"])
+    answer = "; ".join(f"{text} ({', '.join(names)})" for text, names in said.items())
+    content = "".join(
+        text.replace("{}", f"Short-circuit power: {escape(', '.join(names))}", 1)
+        for text, names in tables.items()
+    )
     return Chapter(
         file,
         "How strong is the network?",

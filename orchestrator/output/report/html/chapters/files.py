@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Callable
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +86,15 @@ def sections(chapter: Chapter, number: int) -> str:
     found = re.search(
         r"</nav>(.*)</main>", (place / chapter.page).read_text(encoding="utf-8"), re.DOTALL
     )
-    text = found[1] if found else ""
+    text = _without_answer(found[1], chapter.answer) if found else ""
     text = re.sub(r'(id="|href="#)(section|figure)-', rf"\1chapter-{number}-\2-", text)
     text = re.sub(r"(clip-)(\d+)", rf"\g<1>{number}-\2", text)
     return re.sub(r"<(/?)h([23])>", lambda m: f"<{m[1]}h{int(m[2]) + 1}>", text)
+
+
+def _without_answer(text: str, answer: str) -> str:
+    """Leave out the verdict of a result's own page where the report's first page has told it."""
+    verdict = re.search(r'<p class="verdict">(.*?)</p>', text, re.DOTALL)
+    if verdict is None or not answer.startswith(unescape(re.sub(r"<[^>]*>", "", verdict[1]))):
+        return text
+    return text.replace(verdict[0], "", 1)

@@ -28,7 +28,7 @@ def of_comparison(file: Path, signals: Any) -> Chapter:
         "How do two runs differ?",
         answer=answer,
         good=None,
-        sure=number_of(len(signals), "signal"),
+        sure=f"{number_of(len(signals), 'signal')} compared, listed by how much they differ for their size",
         not_judged=(),
         content=table("Differences", columns, rows, left=2),
     )
@@ -53,11 +53,11 @@ def of_identified(file: Path, modes: Any) -> Chapter:
     sure = (
         f"{sum(not m['doubts'] for m in modes)} of {number_of(len(modes), 'mode')} without a doubt"
     )
-    doubts = [f"{m['frequency_hz']:.3f} Hz: {text}" for m in modes for text in m["doubts"]]
+    doubts = [f"{m['frequency_hz']:.3f} Hz: {'; '.join(m['doubts'])}" for m in modes if m["doubts"]]
     return Chapter(
         file,
         "With which modes does a record ring?",
-        answer=f"strongest: {figures}",
+        answer=f"strongest oscillation: {figures}" if swing else figures,
         good=None,
         sure=sure,
         doubts=doubts,

@@ -71,7 +71,7 @@ def faults_of(scenarios: Sequence[Content]) -> list[str]:
 def of_modes(file: Path, content: Content) -> Chapter:
     rows = [
         [
-            escape(s["name"]),
+            escape(_called(s)),
             f"{m['frequency_hz']:.4f}",
             damping(m["damping_percent"]),
             escape(m["name"] or ""),
@@ -80,11 +80,16 @@ def of_modes(file: Path, content: Content) -> Chapter:
         for s in content["scenarios"]
         for m in s["modes"]
     ]
-    columns = ["Scenario", "f [Hz]", "Damping [%]", "Name", "Who"]
-    groups = {s["name"]: s["modes"] for s in content["scenarios"]}
+    columns = ["Scenario", "f [Hz]", "Damping [%]", "Name", "Who swings"]
+    groups = {_called(s): s["modes"] for s in content["scenarios"]}
     shown = modes_map("Modes", groups) + table("Modes", columns, rows)
     made = of_run(file, content["scenarios"], shown, beside=content.get("beside", []))
     sure = "; ".join(
         filter(None, (made.sure, content["facts"], f"steps of {1e3 * content['step_size_s']:g} ms"))
     )
     return replace(made, sure=sure)
+
+
+def _called(scenario: Content) -> str:
+    """Name a scenario as the verdicts above do."""
+    return str(scenario.get("subject") or scenario.get("title", scenario["name"]))

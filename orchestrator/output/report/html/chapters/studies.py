@@ -1,6 +1,7 @@
 """Chapters of studies of many points: screening, siting, designs, limits and sweeps, sensitivities, interactions."""
 
 import json
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from orchestrator.output.report.html.chapters.chapter import (
     modes_map,
 )
 from orchestrator.output.report.html.charts import bar_chart
-from orchestrator.output.report.html.elements import VERDICTS, table
+from orchestrator.output.report.html.elements import VERDICTS, table, with_minus
 from orchestrator.output.report.html.least_damped import LeastDamped
 from orchestrator.output.report.short_texts import first_sentence
 
@@ -260,14 +261,17 @@ def of_sensitivities(file: Path, c: Content) -> Chapter:
     rows = [
         [
             escape(r["parameter"]),
-            f"{r['value']:.5g} {escape(r['unit'])}",
-            f"{r[key]:+.3g}",
-            f"{r['frequency_hz_per_percent']:+.3g}",
+            f"{r['value']:.5g} {escape(r['unit'])}".removesuffix(" 1"),
+            with_minus(f"{r[key]:+.3g}"),
+            with_minus(f"{r['frequency_hz_per_percent']:+.3g}"),
             escape(r["doubts"]),
         ]
         for r in found
     ]
-    said = ", ".join(f"{r['parameter']} ({r[key]:+.2g})" for r in first) or "no parameter"
+    said = (
+        ", ".join(f"{r['parameter']} ({with_minus(f'{r[key]:+.2g}')})" for r in first)
+        or "no parameter"
+    )
     answer = f"{mode['frequency_hz']:.3f} Hz, {mode['damping_percent']:.2f} %: most by {said} points for 1 % more"
     answer = f"UNSTABLE; {answer}" if c["stable"] is False else answer
     bars = ""
@@ -285,6 +289,15 @@ def of_sensitivities(file: Path, c: Content) -> Chapter:
         answer=answer,
         good=None,
         sure=f"{c['derivative']} derivatives by {number_of(len(found), 'parameter')}",
-        not_judged=[f"{r['parameter']}: {r['reason']}" for r in c["sensitivities"] if r["reason"]],
+        not_judged=_without_derivative(c["sensitivities"]),
         content=bars + table("By the size of their effect", columns, rows),
     )
+
+
+def _without_derivative(sensitivities: Sequence[Content]) -> list[str]:
+    """Tell each reason once, with the parameters that have no derivative for it."""
+    told = dict[str, list[str]]()
+    for one in sensitivities:
+        if one["reason"]:
+            told.setdefault(one["reason"], []).append(one["parameter"])
+    return [f"{few(names, _SHOWN)}: {reason}" for reason, names in told.items()]
