@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -23,6 +24,8 @@ _LARGEST = 4.0
 # change of the logarithm of an amplitude over the record up to which it may be a sine's; up to
 # half, is
 _STEADY = 0.25
+_STEEPEST = 50.0  # change of the logarithm of an amplitude over the record: more is a step
+_EVALUATIONS = 300  # of a fit; most take some ten
 _SEEN = 0.01  # power beside that of all from which on one is told
 
 
@@ -74,12 +77,20 @@ def doubt(kind: str, times: Numbers, z: Numbers, values: Numbers, frequency: flo
 
 def most_explained(t: Numbers, z: Numbers, offsets: Numbers, count: int) -> tuple[Numbers, float]:
     """Which of many frequencies together explain most of signals z, shape (n, m), and which part of their power."""
-    waves = np.exp(2j * np.pi * np.outer(t, offsets))
-    chosen = np.array([*combinations(range(len(offsets)), count)])
-    gram, seen = waves.conj().T @ waves, (waves.conj().T @ z)[chosen]
-    solved = np.linalg.solve(gram[chosen[:, :, None], chosen[:, None, :]], seen)
-    power = (seen.conj() * solved).real.sum(axis=(1, 2))
+    waves, chosen, inverses = _choices(t.tobytes(), offsets.tobytes(), count)
+    seen = (waves.conj().T @ z)[chosen]
+    power = (seen.conj() * (inverses @ seen)).real.sum(axis=(1, 2))
     return offsets[chosen[power.argmax()]], float(power.max() / np.vdot(z, z).real)
+
+
+@lru_cache(maxsize=8)  # the same for all signals of one length, and of an archive all have one
+def _choices(t: bytes, offsets: bytes, count: int) -> tuple[Numbers, Numbers, Numbers]:
+    """Waves of all frequencies, which of them are together, and the inverses of these ones' Gram matrices."""
+    frequencies = np.frombuffer(offsets)
+    waves = np.exp(2j * np.pi * np.outer(np.frombuffer(t), frequencies))
+    chosen = np.array([*combinations(range(len(frequencies)), count)])
+    gram = waves.conj().T @ waves
+    return waves, chosen, np.linalg.inv(gram[chosen[:, :, None], chosen[:, None, :]])
 
 
 def _explained(times: Numbers, z: Numbers, frequency: float, count: int, *, free: bool) -> _Lines:
@@ -87,26 +98,65 @@ def _explained(times: Numbers, z: Numbers, frequency: float, count: int, *, free
     from scipy.optimize import least_squares  # noqa: PLC0415 - slow to import
 
     t, span = np.linspace(0, 1, len(z)), times[-1] - times[0]
-
-    def solved(x: Numbers) -> tuple[Numbers, Numbers]:
-        waves = np.exp(
-            np.outer(t, 2j * np.pi * x[:count] + (np.clip(x[count:], -50, 50) if free else 0))
-        )
-        waves /= np.linalg.norm(waves, axis=0)
-        sizes = np.linalg.lstsq(waves, z, rcond=None)[0]
-        return z - waves @ sizes, sizes
-
     first, _ = most_explained(t, z, np.arange(-_REACH, _REACH + 0.01, 0.25), count)
-    start = [*first, *[-1.0] * count * free]
     x = least_squares(
-        lambda x: solved(x)[0].view(float).ravel(), start, method="lm", max_nfev=300
+        lambda x: _projected(t, z, count, x).rest.view(float).ravel(),
+        [*first, *[-1.0] * count * free],
+        jac=lambda x: _projected(t, z, count, x).jacobian(),
+        method="lm",
+        max_nfev=_EVALUATIONS,
     ).x
-    rest, sizes = solved(x)
+    fit = _projected(t, z, count, x)
+    rest, sizes = fit.rest, fit.sizes
     powers = (np.abs(sizes) ** 2).mean(axis=1)
     seen = [k for k in np.argsort(-powers) if powers[k] >= min(_SEEN, powers.max())]
     changes = x[count:][seen] if free else np.zeros(len(seen))
     left = float(np.vdot(rest, rest).real / z.shape[1])
     return _Lines(frequency + x[:count][seen] / span, changes, powers[seen], left)
+
+
+@dataclass(frozen=True)
+class _Projection:
+    """Signals as sums of some waves, and what these leave; each number that says the waves is of one of them."""
+
+    basis: Numbers  # shape (n, rank)
+    sizes: Numbers  # of the waves in the signals, shape (count, m)
+    rest: Numbers  # what the waves leave of the signals, shape (n, m)
+    dual: Numbers  # conjugate transpose of the waves' pseudo-inverse, shape (n, count)
+    slopes: Numbers  # of the waves, shape (n, numbers); number j is of wave j modulo count
+
+    def jacobian(self) -> Numbers:
+        """Derivatives of the rest, real and imaginary parts in turn, shape (2 n m, numbers).
+
+        From Golub and Pereyra (1973), "The differentiation of pseudo-inverses and nonlinear least squares problems".
+        """
+        wave = np.arange(self.slopes.shape[1]) % len(self.sizes)
+        across = self.slopes - self.basis @ (self.basis.conj().T @ self.slopes)
+        seen = self.slopes.conj().T @ self.rest
+        moved = across[:, None] * self.sizes.T[:, wave] + self.dual[:, None, wave] * seen.T
+        return -np.stack([moved.real, moved.imag], axis=2).reshape(-1, len(wave))
+
+
+def _projected(t: Numbers, z: Numbers, count: int, x: Numbers) -> _Projection:
+    """Project signals on sines, or on exponentials where x has changes of their amplitudes behind the frequencies."""
+    changes = np.clip(x[count:], -_STEEPEST, _STEEPEST)
+    waves = np.exp(np.outer(t, 2j * np.pi * x[:count] + (changes if len(changes) else 0)))
+    waves /= np.linalg.norm(waves, axis=0)
+    left, strengths, right = np.linalg.svd(waves, full_matrices=False)
+    rank = int((strengths > np.finfo(float).eps * len(t) * strengths[0]).sum())
+    basis, inverse = left[:, :rank], right[:rank] / strengths[:rank, None]
+    seen = basis.conj().T @ z
+    along = t[:, None] * waves
+    acts = np.abs(x[count:]) < _STEEPEST  # what is beyond it is cut off
+    return _Projection(
+        basis=basis,
+        sizes=inverse.conj().T @ seen,
+        rest=z - basis @ seen,
+        dual=basis @ inverse,
+        slopes=np.hstack(
+            [2j * np.pi * along, along * acts] if len(changes) else [2j * np.pi * along]
+        ),
+    )
 
 
 def skirt(times: Numbers, values: Numbers, lines: Sequence[float]) -> float:
