@@ -115,10 +115,13 @@ def turned(unit, p=True, q=True):
 
 
 @pytest.mark.parametrize(
-    "reference", ["gfor.droop.delta_P_ref", "sg1.governor.delta_P_ref", "sg2.governor.delta_P_ref"]
+    ("reference", "unit", "q"),
+    [  # each two of the values meet
+        (f"{source}.delta_P_ref", unit, (i + k) % 2 == 0)
+        for i, source in enumerate(("gfor.droop", "sg1.governor", "sg2.governor"))
+        for k, unit in enumerate(("gfor", "sg1", "sg2", "all"))
+    ],
 )
-@pytest.mark.parametrize("unit", ["gfor", "sg1", "sg2", "all"])
-@pytest.mark.parametrize("q", [True, False])
 def test_wrong_signs_of_power_or_current(reference, unit, q):
     found = forced("two_area", reference, 0.8, change=turned(unit, q=q))
     assert found.drives in (None, reference.split(".")[0])
