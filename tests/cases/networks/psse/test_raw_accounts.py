@@ -55,6 +55,21 @@ def test_what_is_held_or_out_of_service_is_told_with_its_line(read):
     assert "3 held (1 " in in_one_line(uses)
 
 
+@pytest.mark.parametrize("revision", [33, 34, 35])
+def test_a_status_stands_in_its_column_of_the_revision(revision, read):
+    """The columns of PSS/E 33, 34 and 35: a machine's GPNS and branches' names and ratings moved them."""
+    columns = {"LOAD": 2, "GENERATOR": 14 if revision < 35 else 15}
+    columns |= {"BRANCH": 13 if revision < 34 else 23, "FIXED SHUNT": 2, "TRANSFORMER": 11}
+    found = records(revision) | {"FIXED SHUNT": ["5,'1 ',1,0,10"]}
+    for section, column in columns.items():
+        fields = found[section][0].split(",")
+        assert fields[column] == "1"
+        fields[column] = "0"
+        found[section][0] = ",".join(fields)
+    out = {x.kind for x in read(revision, found).records if x.why.endswith("its status is 0")}
+    assert out == {section.lower() for section in columns}
+
+
 def test_a_line_between_merged_buses_is_what_it_draws_to_earth(read):
     """Bus 11 is one with bus 4: a second line between them leaves its charging, and nothing else."""
     found = records(33)
