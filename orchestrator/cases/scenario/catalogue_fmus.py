@@ -36,6 +36,10 @@ class PlannedFmu:
     is_there: bool  # whether it is built already
 
 
+_plans: dict[str, PlannedFmu] = {}
+"""Plans of the FMUs that this process built or found built, by their paths."""
+
+
 @cache
 def plan_fmu(
     model: str,
@@ -110,6 +114,12 @@ def _place(recipe: Any) -> list[str]:
 
 @cache
 def build_fmu(planned: PlannedFmu) -> FmuDescription:
+    description = _built(planned)
+    _plans[str(description.path)] = planned
+    return description
+
+
+def _built(planned: PlannedFmu) -> FmuDescription:
     if planned.is_there:
         return planned.description
     from fmus.toolchain.exporter import cached  # noqa: PLC0415 - needs the extra `build`
@@ -154,4 +164,16 @@ def quickest_fmu(model: str) -> FmuDescription:
     """FMU of a model for many runs by itself: without Python in it where this machine compiles.
 
     Both kinds compute the same to the last bit; that with Python reads its outputs in Python after every step."""
-    return catalogue_fmu(model, native=find_spec("ziglang") is not None)
+    return catalogue_fmu(model, native=_compiles())
+
+
+def quickest_twin(description: FmuDescription) -> FmuDescription:
+    """FMU of the same model and parts, as `quickest_fmu`; itself where it is not of the catalogue, or of a network."""
+    planned = _plans.get(str(description.path))
+    if planned is None or planned.network is not None or planned.native or not _compiles():
+        return description
+    return build_fmu(plan_fmu(planned.model, None, native=True, parts=planned.parts))
+
+
+def _compiles() -> bool:
+    return find_spec("ziglang") is not None

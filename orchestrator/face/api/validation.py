@@ -247,6 +247,7 @@ def _of_ours(name: str) -> FmuDescription:
 def _of_case(
     case: str, component: str, scenario: str | None, values: Mapping[str, Any] | None, step: float
 ) -> PlayedDevice:
+    from orchestrator.cases.scenario.catalogue_fmus import quickest_twin  # noqa: PLC0415 - likewise
     from orchestrator.face.api.case import load  # noqa: PLC0415 - an FMU needs no case
 
     prepared = load(case).scenario(scenario, case_values(plain(values))).prepared
@@ -263,6 +264,5 @@ def _of_case(
     rating = plan.number("S_n") if "S_n" in known else 100.0
     rated_hz = plan.number("f_n") if "f_n" in known else _RATED_HZ
     held = {k: float(v) for k, v in plan.inputs.items() if k not in ("v_re", "v_im")}
-    return PlayedDevice(
-        component, plan.description, own, rating, rated_hz, step_size=step, held=held
-    )
+    description = quickest_twin(plan.description)
+    return PlayedDevice(component, description, own, rating, rated_hz, step_size=step, held=held)

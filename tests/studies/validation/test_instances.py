@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.cases.scenario.catalogue_fmus import catalogue_fmu
+from orchestrator.cases.scenario.catalogue_fmus import catalogue_fmu, quickest_fmu
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.fmi.isolated_component import IsolatedComponent
 from orchestrator.face.api import validation as face
@@ -63,6 +63,11 @@ def test_a_model_by_its_name_runs_without_python_and_gives_the_same_to_the_last_
     of_python = replace(device, description=catalogue_fmu("gfor"))
     powers = [one.play(seen.recording, seen.start).power for one in (device, of_python)]
     assert np.array_equal(*powers)
+
+
+def test_a_component_of_a_case_runs_on_the_compiled_fmu_of_its_model():
+    device = face._of_case("infinite_bus", "gfor", "dip", None, 1e-4)
+    assert device.path == quickest_fmu("gfor").path
 
 
 LEAVES = (
