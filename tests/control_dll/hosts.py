@@ -3,7 +3,6 @@
 import ctypes
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -123,25 +122,6 @@ class Circuit:
         i, e = self.x[2].real, self.x[4].real
         i_clarke, e_clarke = (2 / 3 * np.sum(f * np.conj(TURN)) for f in (i, e))
         return 1.5 * e_clarke * np.conj(i_clarke)
-
-
-def compiled_host(folder, target, ending=""):
-    """The host in C for a machine; by a library's flags, or the compiler would build its C library once more."""
-    program = folder / f"host{ending}"
-    compiler = [
-        sys.executable,
-        "-m",
-        "ziglang",
-        "cc",
-        "-target",
-        target,
-        "-O2",
-        "-g0",
-        "-s",
-        "-fno-sanitize=undefined",
-    ]
-    subprocess.run([*compiler, str(HOST), "-o", str(program)], check=True, capture_output=True)
-    return program
 
 
 def driven(call, drive, folder, width=8, environment=None):

@@ -22,15 +22,16 @@ from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from orchestrator.face.cli import main
 from tests.control_dll.conftest import PODS
-from tests.control_dll.hosts import STEP, ControlHost, compiled_host, driven, fmu_call
+from tests.control_dll.hosts import HOST, STEP, ControlHost, driven, fmu_call
+from tests.support.programs import compiled_program
 
 
 @pytest.fixture(scope="module")
-def host(tmp_path_factory):
+def host():
     """The host in C, compiled for this machine."""
     if not sys.platform.startswith("linux"):
         pytest.skip("the host is compiled for Linux")
-    return compiled_host(tmp_path_factory.mktemp("host"), DLL_TARGETS["linux64"][0])
+    return compiled_program(HOST, DLL_TARGETS["linux64"][0])
 
 
 def test_a_host_in_c_gets_the_signals_of_the_fmu_to_the_last_bit(

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from fmus.control_dll.export import DLL_TARGETS
+from orchestrator.devices.sandbox import wine
 from tests.control_dll.conftest import PODS
-from tests.control_dll.hosts import compiled_host, driven, fmu_call
+from tests.control_dll.hosts import HOST, driven, fmu_call
 from tests.support.late import LateLibrary
+from tests.support.programs import compiled_program
 
 pytestmark = pytest.mark.slow
 lief = LateLibrary("lief")
@@ -43,20 +45,15 @@ def test_the_library_exports_the_interface_under_plain_names(written, platform):
 @pytest.fixture(scope="module")
 def under_wine(tmp_path_factory, written, drive):
     """Signals of a platform's DLL, or of the FMU's library for Windows of 64 bits."""
-    wine = shutil.which("wine")
-    if wine is None:
+    if shutil.which("wine") is None:
         pytest.skip("wine is not installed")
-    home = tmp_path_factory.mktemp("wine")
-    environment = {
-        "PATH": os.environ["PATH"],
-        "WINEPREFIX": str(home / "prefix"),
-        "WINEDEBUG": "-all",
-    }
+    prefix = wine.make_prefix(tmp_path_factory.mktemp("wine"))
+    environment = wine.environment(prefix, os.environ)
 
     def run(platform, call):
-        folder = tmp_path_factory.mktemp(platform)
-        program = compiled_host(folder, DLL_TARGETS[platform][0], ".exe")
-        return driven([wine, program, *call], drive, folder, environment=environment)[0]
+        program = compiled_program(HOST, DLL_TARGETS[platform][0])
+        words = [wine.find_wine().loader, program, *call]
+        return driven(words, drive, tmp_path_factory.mktemp(platform), environment=environment)[0]
 
     return run
 

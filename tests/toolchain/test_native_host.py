@@ -14,8 +14,10 @@ from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.compiler import TARGETS
 from fmus.toolchain.exporter import export
 from fmus.toolchain.native_fmu import NativeFmu
+from orchestrator.devices.sandbox import wine
 from tests.support.host import OK, H
 from tests.support.late import LateLibrary
+from tests.support.programs import compiled_program
 
 lief = LateLibrary("lief")
 
@@ -31,23 +33,11 @@ CALLS = (
 )
 
 
-def compile_host(folder, target, ending=""):
-    program = folder / f"host{ending}"
-    compiler = [sys.executable, "-m", "ziglang", "cc", "-target", target]
-    subprocess.run(
-        [*compiler, "-O1", str(HOST), "-o", str(program)],
-        check=True,
-        cwd=folder,
-        capture_output=True,
-    )
-    return program
-
-
 @pytest.fixture(scope="module")
-def linux_host(tmp_path_factory):
+def linux_host():
     if not sys.platform.startswith("linux"):
         pytest.skip("the host is compiled for Linux")
-    return compile_host(tmp_path_factory.mktemp("host"), TARGETS["linux64"][0])
+    return compiled_program(HOST, TARGETS["linux64"][0])
 
 
 def arguments(directory, platform, ending, count, threads, steps):
@@ -158,16 +148,15 @@ def test_the_mac_library_holds_code_for_both_processors(everywhere):
 
 @pytest.mark.slow
 def test_the_windows_library_gives_the_same_bits_under_wine(everywhere, tmp_path, open_host):
-    wine = shutil.which("wine64") or shutil.which("wine")
-    if wine is None:
+    if shutil.which("wine") is None:
         pytest.skip("wine is not installed")
-    program = compile_host(tmp_path, TARGETS["win64"][0], ".exe")
-    environment = {
-        "PATH": os.environ["PATH"],
-        "WINEPREFIX": str(tmp_path / "wine"),
-        "WINEDEBUG": "-all",
-    }
-    call = [wine, str(program), *arguments(everywhere, "win64", ".dll", 3, 1, 40)]
+    program = compiled_program(HOST, TARGETS["win64"][0])
+    environment = wine.environment(wine.make_prefix(tmp_path), os.environ)
+    call = [
+        wine.find_wine().loader,
+        str(program),
+        *arguments(everywhere, "win64", ".dll", 3, 1, 40),
+    ]
     result = subprocess.run(
         call, env=environment, capture_output=True, text=True, check=False, timeout=300
     )
