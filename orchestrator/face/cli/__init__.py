@@ -49,8 +49,16 @@ OLD = {
 # a command in a group has the module of its old name
 _MODULES = {new: old for old, new in OLD.items()}
 
-_READERS = ("report", "signal compare", "signal identify", "signal source", "validate", "verify")
-"""Commands that read recordings, with xarray, and hand no array of theirs to dask or pint."""
+_READERS = (
+    "certify",
+    "report",
+    "signal compare",
+    "signal identify",
+    "signal source",
+    "validate",
+    "verify",
+)
+"""Commands that read or write recordings, with xarray, and hand no array of theirs to dask or pint."""
 
 # the page that ``gfor`` alone prints
 QUESTIONS = Path(__file__).with_name("questions.txt").read_text(encoding="utf-8")

@@ -5,9 +5,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import xarray as xr
-
 from orchestrator.core.errors import InputError
+from orchestrator.core.late import import_xarray_alone, xr
 from orchestrator.face.api.case import Case, load
 from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ
 from orchestrator.output.report.explorer_cells import CELLS, check_case, found_from, read_cells
@@ -44,6 +43,7 @@ def certified(file: Path) -> tuple[str, dict[str, Any]]:
                 f"{file}: it cannot be read as a matrix of certificates: {error!r}; give one of the "
                 "certificates in its folder, or make it anew"
             ) from error
+    import_xarray_alone()
     for k, (code, place) in enumerate(places):
         folder, content = read_certificate(place)
         faults = verify_files(folder, content).faults

@@ -1,19 +1,21 @@
 """Time responses for the page: the linear model's at once, and the co-simulation's while it runs."""
 
+from __future__ import annotations
+
 import json
 import time
 from collections.abc import Callable, Iterable, Sequence
 from fnmatch import fnmatchcase
 from math import isclose
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from orchestrator.cases.form.names import variables_of
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import InputError
+from orchestrator.core.late import import_xarray_alone
 from orchestrator.face.api.results import Run
 from orchestrator.face.api.scenario import Scenario
 from orchestrator.output.report.html.charts import thinned
@@ -21,6 +23,9 @@ from orchestrator.output.results.signals import combined, signal
 from orchestrator.output.results.staging import new_run_id
 from orchestrator.output.results.trajectory import open_trajectory
 from orchestrator.systems.coupling.observers import ObservedRun
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _POINTS = 1000  # of a streamed curve
 _PAUSE = 0.25  # between two parts of a streamed curve [s]
@@ -108,6 +113,7 @@ def undrawn(wanted: Sequence[str], drawn: Iterable[str]) -> list[str]:
 
 
 def linear(scenario: Scenario, wanted: Sequence[str]) -> dict[str, Any]:
+    import_xarray_alone()
     drawn = curves(scenario.response(), chosen(scenario, wanted))
     return {"curves": drawn, "undrawn": undrawn(wanted, drawn)}
 
@@ -115,6 +121,7 @@ def linear(scenario: Scenario, wanted: Sequence[str]) -> dict[str, Any]:
 def simulated(scenario: Scenario, wanted: Sequence[str], say: Say) -> dict[str, Any]:
     """Run the co-simulation and keep it as ``gfor run`` does: ``folder``, ``curves``, ``findings``, ``ended_early``;
     ``undrawn``: what `undrawn` returns."""
+    import_xarray_alone()
     names = chosen(scenario, wanted)
     run: Run = scenario.run(observers=[Streamed(scenario, names, say)])
     folder = run.save(Path("results") / "explore" / f"{scenario.prepared.case.name}_{new_run_id()}")
@@ -143,6 +150,7 @@ def recorded(place: str, scenario: Scenario, wanted: Sequence[str]) -> dict[str,
         raise InputError(
             f"nothing was recorded of scenario {scenario.name!r}; choose another one, or run it"
         )
+    import_xarray_alone()
     prepared, dataset = scenario.prepared, open_trajectory(Path(place))
     names = [str(name) for name in dataset.data_vars]
     found = [

@@ -1,14 +1,16 @@
 """The contents of a certificate as JSON: the verdicts with their figures, and the data that a verification needs."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from fmus.toolchain.extras import installed_version
+from orchestrator.core.late import xr
 from orchestrator.devices.fmi.archive import read_origin
 from orchestrator.devices.fmi.description import FmuDescription, VariableInfo
 from orchestrator.devices.fmi.port_mapping import START, BoundDescription, without_binding

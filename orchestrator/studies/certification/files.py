@@ -1,13 +1,13 @@
 """Files of a certificate: the page, the figures as JSON, the responses as NetCDF, and the hashes of all files."""
 
+from __future__ import annotations
+
 import hashlib
 import json
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
-
-import xarray as xr
+from typing import TYPE_CHECKING, Any
 
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import read_text
@@ -27,6 +27,9 @@ from orchestrator.studies.certification.figures import damping_json, damping_res
 from orchestrator.studies.certification.form import NORM, case_files
 from orchestrator.studies.certification.report import page
 from orchestrator.studies.points.store import POINTS, holds_points_alone
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # names of files in a certificate's folder
 HTML = "certificate.html"

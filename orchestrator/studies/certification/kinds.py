@@ -1,17 +1,18 @@
 """The two kinds of tests that codes have: NTS 631's points with a case of their own, and rows on the test bench."""
 
+from __future__ import annotations
+
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, MISSING, dataclass
 from pathlib import Path
 from typing import Any
 
-import xarray as xr
-
 from orchestrator.cases.form.given import binding_path, plain
 from orchestrator.cases.form.schema import Value
 from orchestrator.core.asked import FILE, FLAG, FieldKind, number_in, one_of, path, request_field
 from orchestrator.core.errors import InputError
+from orchestrator.core.late import xr
 from orchestrator.core.options import Option
 from orchestrator.core.spelling import Spelling
 from orchestrator.devices.fmi.device_or_controller import as_device
@@ -235,7 +236,7 @@ class CertifyRequest:
     )
     progress: bool = request_field(FLAG, False, "show a bar", option=None)
 
-    def issue(self) -> "Issue":
+    def issue(self) -> Issue:
         """How it is computed."""
         binding = None if self.binding is None else Path(self.binding)
         fmu, values = Path(self.fmu), self.values or {}

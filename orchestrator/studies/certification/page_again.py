@@ -1,13 +1,13 @@
 """The page of a certificate, made anew and compared as a document: what it hides or adds is seen."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any
-
-import xarray as xr
+from typing import TYPE_CHECKING, Any
 
 from orchestrator.cases.case import load_case
 from orchestrator.core.foreign_files import read_text
@@ -18,6 +18,9 @@ from orchestrator.studies.certification.files import HTML, JSON, PDF, figures_ha
 from orchestrator.studies.certification.form import NORM
 from orchestrator.studies.certification.kinds import rebuilt
 from orchestrator.studies.certification.report import page
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _VIEW = "a view, not proved"
 _NUMBER = re.compile(r"[-+]?\d[\d.,]*(?:[eE][-+]?\d+)?")

@@ -1,5 +1,7 @@
 """Points of a damping test, judged again from what a folder keeps of them, and computed anew."""
 
+from __future__ import annotations
+
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Sequence

@@ -1,19 +1,22 @@
 """Sources of a report: the folders that `gfor run` and `gfor sweep` leave."""
 
+from __future__ import annotations
+
 import csv
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import xarray as xr
+from typing import TYPE_CHECKING, Any
 
 from orchestrator.cases.case import Case, load_case
 from orchestrator.core.errors import InputError
 from orchestrator.output.results.manifest import MANIFEST, check_one_run, checked, read_manifest
 from orchestrator.output.results.recording_reader import open_whole, warn_of_early_end
 from orchestrator.output.results.recording_writer import TRAJECTORY
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 SUMMARY = "summary.json"  # what a folder of `gfor run` has, and no other
 

@@ -1,13 +1,15 @@
 """Records of the rows on the test bench in the files of a certificate: figures, responses, chapters of the page."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Sequence
 from html import escape
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from orchestrator.core.arrays import Numbers
+from orchestrator.core.late import xr
 from orchestrator.output.report.colours import colour
 from orchestrator.output.report.html.charts import ChartCurve, legend, line_chart
 from orchestrator.output.report.html.elements import Figures, bullet_list, table

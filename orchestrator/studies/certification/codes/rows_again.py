@@ -1,5 +1,7 @@
 """Rows of a code, judged again from what a folder keeps of them, and computed anew."""
 
+from __future__ import annotations
+
 import random
 from collections.abc import Sequence
 from pathlib import Path
