@@ -1,9 +1,11 @@
 """The files of the page: no build step, nothing from elsewhere."""
 
+import json
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+from orchestrator.cases.case import BUILT_IN
 from orchestrator.output.report.html.elements import held_data
 
 PAGE = "page.html"
@@ -26,6 +28,9 @@ FILES = {
     **dict.fromkeys(SCRIPTS, "text/javascript; charset=utf-8"),
 }
 
+_FOLDER_OF_CASES = json.dumps(str(BUILT_IN / "_"))[1:-2]
+"""How JSON writes the folder of the built-in cases: a page that is handed on does not tell where they are installed."""
+
 _PLACE = Path(__file__).parent / "page"
 
 
@@ -42,6 +47,7 @@ def whole_page(saved: Any) -> str:
     )
     for name in SCRIPTS:
         held = held_data("saved", saved) if name == SCRIPTS[0] else ""
+        held = held.replace(_FOLDER_OF_CASES, "")
         text = text.replace(
             f'<script src="{name}"></script>', f"{held}<script>{content_of(name).decode()}</script>"
         )
