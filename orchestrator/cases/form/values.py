@@ -9,10 +9,10 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from fmus.toolchain.port_variables import I_RE, S_BASE, S_N, SYSTEM_BASE, SYSTEM_BASE_MVA
-from orchestrator.cases.form.schema import Value
 from orchestrator.core.units import to_unit
 
 if TYPE_CHECKING:
+    from orchestrator.cases.form.schema import Value
     from orchestrator.devices.fmi.description import FmuDescription, VariableInfo
 
 # in the description of a variable that chooses: what its numbers mean
