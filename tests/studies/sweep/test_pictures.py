@@ -164,4 +164,6 @@ def test_a_sweep_shows_itself_under_its_own_name(monkeypatch):
     sweep.result = SimpleNamespace(plan=plan, failures=lambda: iter(()), scenarios=[])
     sweep.samples = SimpleNamespace(axes=[SimpleNamespace(key="grid.X_L")])
     monkeypatch.setattr(ParameterSweep, "table", lambda self: pd.DataFrame())
-    assert sweep._repr_html_().startswith("<p><b>ParameterSweep of two_area over grid.X_L</b>")
+    verdict, name, *_ = sweep._repr_html_().splitlines()
+    assert "<b>stable at all points</b>" in verdict
+    assert name.startswith("<p><b>ParameterSweep of two_area over grid.X_L</b>")
