@@ -31,6 +31,7 @@ from orchestrator.studies.validation.magnitude import ask_of_magnitude
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.record import PortBases, Recording, at_port
 from orchestrator.studies.validation.transformer import AT_PORT, Between, Beyond
+from orchestrator.studies.validation.voltage_clocks import ask_of_voltage_clocks
 
 _UNREADABLE = (
     QuestionKind.OTHER_EVENT,
@@ -231,6 +232,7 @@ def question_readings(comparison: EventComparison, bases: PortBases) -> list[Que
     explained = [
         *lost_jump(comparison),
         *_clock(comparison, whole),
+        *ask_of_voltage_clocks(comparison),
     ]
     if not comparison.lacks_limit:  # whose part a lag would play
         explained += ask_of_lag(comparison)

@@ -7,7 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from orchestrator.core.arrays import Complex
+from orchestrator.core.arrays import Complex, Numbers
+from orchestrator.studies.validation.averaging import averaged
+from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import EventComparison, RecordedEvent, cut_event
 from orchestrator.studies.validation.questions import Question, QuestionKind
 
@@ -39,8 +41,9 @@ def _from_the_other_side(comparison: EventComparison, role: str) -> Iterator[Que
     turned = power.conjugate() if role == "q" else -power.conjugate()
     tried = f"{role.upper()} of the other sign before the event"
     with comparison.device.trials.trial(tried, of_reading=True):
-        played = comparison.device.play(near.recording, replace(near.start, power=turned))
-        yield from _question_of(near, role, played.power, comparison)
+        turned_start = replace(near.start, power=turned)
+        played = comparison.device.play(near.recording, turned_start)
+        yield from _question_of(replace(near, start=turned_start), role, played.power, comparison)
 
 
 def _question_of(
@@ -54,7 +57,19 @@ def _question_of(
     if not crosses or seen.min() < _NEVER_BELOW * least:
         return
     error = float(np.sqrt(np.mean((now - seen) ** 2)))
+    most = min(_EXPLAINS * error, float(seen.std()))
     left = float(np.sqrt(np.mean((np.abs(own) - seen) ** 2)))
-    if left <= min(_EXPLAINS * error, float(seen.std())):
+    if left > most and recording.average > recording.interval and not recording.ahead:
+        sizes = _means_of_size(event, role, comparison.device)[recording.good]
+        left = float(np.sqrt(np.mean((sizes - seen) ** 2)))
+    if left <= most:
         figures = {"role": role, "column": recording.channels[role].column, "least": least}
         yield Question(QuestionKind.MAGNITUDE, figures | {"error": error, "left": left})
+
+
+def _means_of_size(event: RecordedEvent, role: str, device: PlayedDevice) -> Numbers:
+    """The means of the device's P or Q that lost its sign before they were taken: a mean of both signs is smaller."""
+    recording = event.recording
+    power = device.play(replace(recording, average=0.0), event.start).power
+    sizes = np.abs(power.real if role == "p" else power.imag) + 0j
+    return averaged(recording.times, sizes, recording.average, recording.times).real

@@ -335,6 +335,12 @@ def _clocks(x: Figures) -> str:
     late = "after" if x["delay"] > 0 else "before"
     both = " by the same time" if x["together"] > 1 else ""
     comes = "come" if "and" in x["which"] else "comes"
+    if not x["together"]:
+        return (
+            f"{x['which']} {comes} {1000 * abs(x['delay']):.3g} ms {late} the rest of the recording, as jumps show, "
+            f"and without that {fall_of_error(x)}: do the clocks of magnitude and angle differ? gfor shifts nothing. "
+            "Give an export in which both are of one time"
+        )
     return (
         f"{x['which']} {comes} {1000 * abs(x['delay']):.3g} ms {late} the model's{both}, and without that "
         f"{fall_of_error(x)}: do the clocks of voltage and power differ, or has the plant a delay that the model "
