@@ -474,6 +474,11 @@ def _of_step(comparison: EventComparison) -> list[Question]:
     return [Question(QuestionKind.OUT_OF_STEP, figures)]
 
 
+def loses_step(comparison: EventComparison) -> bool:
+    """Return whether the model falls out of step, the plant does, or the angle jumps by itself."""
+    return any(one.kind in _ENDS for one in comparison.questions)
+
+
 def in_step(comparison: EventComparison) -> EventComparison:
     """The comparison up to where the model falls out of step, the plant does, or the angle jumps by itself.
 

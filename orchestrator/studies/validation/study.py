@@ -22,6 +22,7 @@ from orchestrator.studies.validation.event import (
     before_setpoint,
     compare_with,
     in_step,
+    loses_step,
     prepare_event,
     rms_error,
 )
@@ -282,14 +283,17 @@ def _search_causes(
     lag = lag_alone(comparisons)
     if lag is not None:
         return CauseSearch([lag])
-    kept = [in_step(one) for one in comparisons]
-    before = [before_setpoint(one) for one in comparisons]
-    found = explain_errors(device, before, report, [before_setpoint(one) for one in kept])
-    whole = [one.event for one in comparisons]
+    before, whole = ([before_setpoint(x) for x in comparisons], [x.event for x in comparisons])
+    kept_before: list[RecordedEvent] | None = None
+    kept_whole: list[RecordedEvent] | None = None
+    if any(map(loses_step, comparisons)):
+        kept = [in_step(one) for one in comparisons]
+        kept_before, kept_whole = [before_setpoint(x) for x in kept], [x.event for x in kept]
+    found = explain_errors(device, before, report, kept_before)
     same = all(one is other for one, other in zip(before, whole, strict=True))
     if found.explains or not found.finished or same:
         return found
-    other = explain_errors(device, whole, report, [one.event for one in kept])
+    other = explain_errors(device, whole, report, kept_whole)
     taken = other if other.explains and not other.causes[0].leaves_much else found
     return replace(taken, finished=other.finished)
 
