@@ -4,11 +4,13 @@ import csv
 import json
 import re
 import shlex
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
-from tests.pages.markdown import ROOT
+from tests.pages.markdown import ROOT, blocks
 
 PAGE = ROOT / ".docs" / "validation" / "errors-in-silence.md"
 TITLES = re.findall(r"^## (.*)$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
@@ -21,14 +23,20 @@ def section(title):
         re.search(rf"```{language}\n(.*?)```", text, re.DOTALL)[1].splitlines()
         for language in ("sh", "text")
     )
-    return [shlex.split(line)[1:] for line in typed], said
+    return [shlex.split(line) for line in typed], said
 
 
 @pytest.mark.parametrize("title", TITLES)
 def test_a_command_says_what_the_page_says(title, gfor, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     typed, said = section(title)
-    text = "\n".join(out + err for _, out, err in (gfor(*words) for words in typed))
+    for block in blocks(PAGE):
+        if block.path:
+            (tmp_path / block.path).write_text(block.text, encoding="utf-8")
+    for _, *words in (line for line in typed if line[0] == "python"):
+        subprocess.run([sys.executable, *words], check=True)
+    own = [words for program, *words in typed if program == "gfor"]
+    text = "\n".join(out + err for _, out, err in (gfor(*words) for words in own))
     one_line = " ".join(text.split())
     assert [line for line in said if line not in one_line] == []
 

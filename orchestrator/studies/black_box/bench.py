@@ -32,6 +32,15 @@ STILL = 1e-9
 """Largest change of an output over a second [pu] at which the device counts as being in steady state; of its mean over
 the period, where a sampled controller of phase quantities makes the output repeat after a period."""
 
+_LASTS = 0.01
+"""Part by which the swings of two successive seconds may differ if they are to be called lasting."""
+
+_FAST = 5
+"""Lowest frequency [Hz] that is told from a drift within a second."""
+
+_OF_ONE_LINE = 0.5
+"""Least share of a movement's power that its strongest line has where the movement is called by that frequency."""
+
 
 @dataclass
 class Bench:
@@ -159,6 +168,7 @@ class Runs:
         once."""
         bench = self._bench
         second = round(1.0 / bench.step_size)
+        before = np.inf
         while True:
             outputs = self._means(self._hold(second))
             movement = np.abs(np.ptp(outputs, axis=0)).max()
@@ -166,11 +176,16 @@ class Runs:
                 self.still_after = self._index * bench.step_size - 1.0
                 return np.asarray(outputs[-1])
             if self._index * bench.step_size >= bench.longest_wait:
+                lasts = abs(movement - before) <= _LASTS * movement
                 raise AnalysisError(
-                    f"{bench.description.path.name}: alone at an ideal bus its current still moves by {movement:.3g} "
-                    f"pu in a second after {bench.longest_wait:g} s, so there is no operating point to identify it at; "
-                    "check its start values, or give it more time"
+                    f"{bench.description.path.name}: alone at an ideal bus its current still "
+                    + _never_still(
+                        movement,
+                        _main_line(outputs) if lasts else None,
+                        self._index * bench.step_size,
+                    )
                 )
+            before = movement
 
     def _means(self, outputs: Numbers) -> Numbers:
         """Means over the period after which the device repeats, one below the other; else the outputs as they are."""
@@ -192,6 +207,30 @@ class Runs:
         outputs = drive(self._running, names, inputs, bench.step_size, self._index)
         self._index += len(inputs)
         return outputs
+
+
+def _main_line(outputs: Numbers) -> int | None:
+    """Return the frequency [Hz] of most of what moves within a second; None where no fast one has most of it."""
+    lines = np.abs(np.fft.rfft(outputs - outputs.mean(axis=0), axis=0)) ** 2
+    power = lines.sum(axis=1)
+    first = int(power.argmax())
+    return first if first >= _FAST and power[first] >= _OF_ONE_LINE * power.sum() else None
+
+
+def _never_still(movement: float, hertz: int | None, waited: float) -> str:
+    """Say what a device does that never comes to rest, and what to do about it.
+
+    ``hertz``: the frequency at which it swings, no less than a second before; None where it does something else."""
+    if hertz is None:
+        return (
+            f"moves by {movement:.3g} pu in a second after {waited:g} s, so there is no operating point to identify it "
+            "at; check its start values, or give it more time"
+        )
+    return (
+        f"swings by {movement:.3g} pu at {hertz} Hz of the turning frame after {waited:g} s, no less than a second "
+        "before: it emits a harmonic or oscillates by itself, and a measurement would take that for its answer; "
+        "measure it with the emission switched off, or an averaged model of it"
+    )
 
 
 def drive(

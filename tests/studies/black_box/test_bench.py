@@ -1,10 +1,12 @@
 """What a box does at once, measured at a component that is a matrix."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from orchestrator.core.errors import AnalysisError
 from orchestrator.studies.black_box import bench
 from orchestrator.studies.black_box.bench import Runs
 from orchestrator.studies.black_box.frequency_response import odd_lines
@@ -50,3 +52,31 @@ def test_a_response_is_the_deviation_from_the_operating_point(monkeypatch):
     deviations = np.array([[0.0, 0.0], [0.1, -0.3]])
     (found,) = run.respond([deviations])
     np.testing.assert_allclose(found, deviations @ D.T, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("course", "words"),
+    [
+        (
+            lambda t: 0.01 * np.sin(600 * np.pi * t),
+            r"swings by 0\.02 pu at 300 Hz of the turning frame after 5 s",
+        ),
+        (lambda t: np.exp(-t / 20) * np.sin(600 * np.pi * t), "moves by .* give it more time"),
+        (lambda t: 0.01 * t, "moves by 0.01 pu in a second after 5 s"),
+    ],
+)
+def test_a_device_that_emits_a_line_is_told_apart_from_one_that_is_not_yet_at_rest(course, words):
+    run, h = object.__new__(Runs), 1e-4
+    named = SimpleNamespace(path=Path("vendor.fmu"))
+    run._bench = SimpleNamespace(description=named, step_size=h, longest_wait=5.0)
+    run._index = 0
+    run._means = lambda outputs: outputs
+
+    def hold(count):
+        times = h * (run._index + np.arange(count))
+        run._index += count
+        return np.stack([course(times), 0.5 * course(times)], axis=1)
+
+    run._hold = hold
+    with pytest.raises(AnalysisError, match=words):
+        run._come_to_rest()
