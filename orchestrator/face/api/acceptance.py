@@ -82,9 +82,12 @@ class Acceptance(NoTruth, ask=".trusted"):
         return f"<Acceptance of {self.report.fmu.name}: {self.report.sentence}>"
 
     def _repr_html_(self) -> str:
-        from orchestrator.output.report.notebook import page  # noqa: PLC0415 - imports pandas
+        from orchestrator.output.report.notebook import headline, page  # noqa: PLC0415 - imports pandas
 
-        return page(f"{self.report.fmu.name}: {self.report.sentence}", table=self.table())
+        report = self.report
+        refused = report.failures or report.reasons
+        top = headline(report.sentence, report.trusted if refused or report.trusted else None)
+        return page(f"Check of {report.fmu.name}", table=self.table(), verdict=top)
 
 
 def check(

@@ -13,7 +13,7 @@ from orchestrator.core.safe_files import made_folder
 from orchestrator.core.truth import NoTruth
 from orchestrator.face.api.methods import function
 from orchestrator.face.api.progress import shown_progress
-from orchestrator.output.report.notebook import page
+from orchestrator.output.report.notebook import headline, page
 from orchestrator.output.results.lock import hold_folder
 from orchestrator.output.signatures.checking import State
 from orchestrator.output.signatures.signing import check_key
@@ -57,7 +57,9 @@ class IssuedCertificate(NoTruth, ask=".verdict"):
         return self.content
 
     def _repr_html_(self) -> str:
-        return page(f"{self.verdict}: {self.sentence}", [f"Folder: {self.folder}"])
+        good = {"passes": True, "fails": False}.get(self.verdict)
+        top = headline(f"{self.verdict}: {self.sentence}", good)
+        return page(f"Certificate in {self.folder}", verdict=top)
 
     def __repr__(self) -> str:
         return f"<IssuedCertificate in {self.folder}: {self.verdict}>"

@@ -469,6 +469,19 @@ class Run(NoTruth):
         return page(
             f"Run of {prepared.case.name}: {prepared.title}",
             lines,
-            rest=str(self.dataset._repr_html_()),
+            self._ranges(),
             verdict=headline(self.verdict, self.stable),
+        )
+
+    def _ranges(self) -> pd.DataFrame:
+        """One row for each signal: unit, first and last value, the least and the largest."""
+        rows = {}
+        for name, signal in self.dataset.data_vars.items():
+            values = signal.values
+            shown = (
+                (values[0], values[-1], values.min(), values.max()) if len(values) else [np.nan] * 4
+            )
+            rows[name] = [signal.attrs.get("units", ""), *shown]
+        return pd.DataFrame.from_dict(
+            rows, orient="index", columns=["unit", "first", "last", "least", "largest"]
         )

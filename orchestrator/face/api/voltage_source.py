@@ -9,7 +9,7 @@ from orchestrator.core.asked import path as path_of
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder
 from orchestrator.core.truth import NoTruth
-from orchestrator.output.report.notebook import page
+from orchestrator.output.report.notebook import headline, page
 from orchestrator.output.results.lock import hold_folder
 from orchestrator.studies.certification.codes.frequency import files, measurement
 from orchestrator.studies.certification.codes.frequency.point import AtPoint
@@ -58,7 +58,8 @@ class VoltageSource(NoTruth, ask=".verdict, which is True, False, or None where 
             return files.save(self._points, self.content, place)
 
     def _repr_html_(self) -> str:
-        return page(repr(self)[1:-1], [self.sentence], self.table())
+        top = headline(self.sentence, self.verdict)
+        return page(repr(self)[1:-1], table=self.table(), verdict=top)
 
     def __repr__(self) -> str:
         is_one = {True: "is one", False: "is none", None: "not judged"}[self.verdict]

@@ -12,7 +12,7 @@ import numpy as np
 
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.truth import NoTruth
-from orchestrator.output.report.notebook import page
+from orchestrator.output.report.notebook import headline, page
 from orchestrator.output.signatures.checking import SignatureSeen, State
 from orchestrator.studies.certification.case_file import BINDING, FMU
 from orchestrator.studies.certification.request import CertificationRequest
@@ -68,11 +68,16 @@ class Verification(NoTruth, ask=".holds"):
 
     def _repr_html_(self) -> str:
         signed = [str(one.sentence) for one in self.signatures.values()]
-        return page(repr(self)[1:-1], [*self.faults, *self.unproved, *signed, *self.agreed])
+        lines = [*self.faults, *self.unproved, *signed, *self.agreed]
+        return page("Verification", lines, verdict=headline(self._verdict, self.holds))
 
     def __repr__(self) -> str:
+        return f"<Verification: {self._verdict}>"
+
+    @property
+    def _verdict(self) -> str:
         what = "; ".join(self.faults) if self.faults else f"{len(self.agreed)} things agree"
-        return f"<Verification: {'holds' if self.holds else 'does not hold'}: {what}>"
+        return f"{'holds' if self.holds else 'does not hold'}: {what}"
 
 
 _LEAST_WORTH = (State.CHANGED, State.UNSIGNED, State.UNKNOWN, State.GOOD)

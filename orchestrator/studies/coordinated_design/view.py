@@ -12,7 +12,7 @@ from orchestrator.core.late import pd
 from orchestrator.core.safe_files import write_text
 from orchestrator.core.truth import NoTruth
 from orchestrator.output.report.column_table import Column, ColumnTable
-from orchestrator.output.report.notebook import page
+from orchestrator.output.report.notebook import headline, page
 from orchestrator.output.report.terminal_tables import PlainTable, make_table
 from orchestrator.output.results.file_writers import save_json
 from orchestrator.output.results.manifest import made_now
@@ -94,8 +94,9 @@ class CoordinatedDesign(NoTruth, ask=".met, which is True, False, or None where 
 
     def _repr_html_(self) -> str:
         settings = ", ".join(f"{k} = {v}" for k, v in self.parameters.items())
-        lines = [self.verdict, what_it_rests_on(self.result), settings]
-        return page(f"Design over points of {self.result.plan.case.name}", lines, self.points())
+        lines, top = [what_it_rests_on(self.result), settings], headline(self.verdict, self.met)
+        title = f"Design over points of {self.result.plan.case.name}"
+        return page(title, lines, self.points(), verdict=top)
 
 
 def as_json(design: PointsDesign) -> dict[str, Any]:

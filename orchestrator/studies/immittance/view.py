@@ -12,7 +12,7 @@ from rich.markup import escape
 from orchestrator.core.late import pd
 from orchestrator.core.spelling import spelled
 from orchestrator.core.truth import NoTruth
-from orchestrator.output.report.notebook import page
+from orchestrator.output.report.notebook import headline, page
 from orchestrator.output.report.terminal_tables import make_table
 from orchestrator.output.report.verdict_sentence import VerdictSentence
 from orchestrator.output.results.file_writers import save_json
@@ -52,6 +52,11 @@ class Nyquist(NoTruth, ask=".verdict"):
     def verdict(self) -> str:
         """``stable``, ``unstable`` or ``not known``."""
         return str(self.result.verdict)
+
+    @property
+    def stable(self) -> bool | None:
+        """Return whether it is stable; None where that is not known."""
+        return {"stable": True, "unstable": False}.get(self.verdict)
 
     @property
     def reasons(self) -> tuple[str, ...]:
@@ -113,7 +118,8 @@ class Nyquist(NoTruth, ask=".verdict"):
         m = self.result.margins
         rows = [] if m is None else [(n, *_cells(getattr(m, k), text)) for n, k, text in _MARGINS]
         table = pd.DataFrame(rows, columns=["margin", "value", "at [Hz]"]) if rows else None
-        return page(f"{self.verdict}: {self.result.because}", self.reasons, table)
+        top = headline(f"{self.verdict}: {self.result.because}", self.stable)
+        return page("Nyquist's criterion at the cut", self.reasons, table, verdict=top)
 
     def __repr__(self) -> str:
         return f"<Nyquist {self.verdict}: {self.result.because}>"
@@ -122,8 +128,7 @@ class Nyquist(NoTruth, ask=".verdict"):
 def parts(found: Nyquist) -> Iterator[RenderableType]:
     """Yield the rows of a terminal: verdict, margins, where a side is not passive, how far a scan is off."""
     result = found.result
-    good = {"stable": True, "unstable": False}.get(str(result.verdict))
-    yield VerdictSentence(good, str(result.verdict), result.because).markup()
+    yield VerdictSentence(found.stable, str(result.verdict), result.because).markup()
     m = result.margins
     if m is not None:
         rows = [(name, *_cells(getattr(m, key), text)) for name, key, text in _MARGINS]

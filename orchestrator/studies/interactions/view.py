@@ -14,7 +14,7 @@ from orchestrator.output.report.column_table import Column, ColumnTable
 from orchestrator.output.report.explorer_cells import CELLS, Cell, CellLine, Cells
 from orchestrator.output.report.html.elements import Figures, document, paragraphs
 from orchestrator.output.report.mode_tables import mode_columns, verdict
-from orchestrator.output.report.notebook import page
+from orchestrator.output.report.notebook import headline, page
 from orchestrator.output.report.short_texts import first_few
 from orchestrator.output.results.file_writers import save_json, save_table
 from orchestrator.output.results.mode_json import eigenvalue_json
@@ -185,7 +185,9 @@ class Interactions(NoTruth):
         return f"<Interactions of {', '.join(plan.vendors)} in {plan.case.name}>"
 
     def _repr_html_(self) -> str:
-        return page(repr(self).strip("<>"), self.sentences, self.pairs())
+        first, *more = self.sentences
+        top = headline(first, self.stable)
+        return page(repr(self).strip("<>"), more, self.pairs(), verdict=top)
 
 
 def modes_table(judgement: JudgedInteractions) -> ColumnTable[JudgedMode]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder
 from orchestrator.output.report.column_table import Column, ColumnTable
-from orchestrator.output.report.notebook import page
+from orchestrator.output.report.notebook import headline, page
 from orchestrator.output.results.file_writers import save_json, save_table
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.output.results.staging import new_run_id, staged
@@ -67,10 +67,11 @@ class Sensitivities:
 
     def _repr_html_(self) -> str:
         table = self.table()
-        lines = [tell_most(self.result), *(f"warning: {text}" for text in self.warnings)]
+        lines = [f"warning: {text}" for text in self.warnings]
         for name, text in _long_texts(table).items():
             lines.append(f"{name}: {text}")
-        return page(repr(self).strip("<>"), lines, table.map(_short_text))
+        top = headline(_most_of(self.result), None)
+        return page(repr(self).strip("<>"), lines, table.map(_short_text), verdict=top)
 
 
 _LONGEST = 40
@@ -103,16 +104,21 @@ def name_of(result: SensitivityResult) -> str:
 
 
 def tell_most(result: SensitivityResult) -> str:
-    """Tell what moves the damping most, of the figures without a doubt, and how the rows are ordered."""
+    """Tell what moves the damping most, and how the rows are ordered."""
+    return (
+        f"{_most_of(result)}. The table is ordered by points per %, the largest first; values of 0, which have no "
+        "percent, come behind"
+    )
+
+
+def _most_of(result: SensitivityResult) -> str:
+    """Return the values that move the damping most, of the figures without a doubt."""
     trusted = (row for row in result.rows if row.damping_per_percent and not row.doubts)
     first = [
         f"{row.parameter.name} ({_text(row.damping_per_percent)})" for row in islice(trusted, _TOLD)
     ]
     most = f"damping moves most with {', '.join(first)}, in points for 1 % more of the value"
-    return (
-        f"{name_of(result)}: {most if first else 'no percentage of a value moves its damping'}. The table is ordered "
-        "by points per %, the largest first; values of 0, which have no percent, come behind"
-    )
+    return f"{name_of(result)}: {most if first else 'no percentage of a value moves its damping'}"
 
 
 def sensitivity_table(result: SensitivityResult) -> ColumnTable[Sensitivity]:

@@ -12,7 +12,7 @@ from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder, write_text
 from orchestrator.output.report.column_table import ShownTable
-from orchestrator.output.report.notebook import page
+from orchestrator.output.report.notebook import headline, page
 from orchestrator.output.results.file_writers import save_json, save_table
 from orchestrator.output.results.lock import hold_folder
 from orchestrator.output.results.staging import new_run_id, staged
@@ -37,6 +37,9 @@ class RankedPlaces(Protocol):
 
     @property
     def breaking(self) -> Sequence[Confirmation]: ...
+
+    @property
+    def confirmations(self) -> Sequence[Confirmation]: ...
 
 
 Ranked = TypeVar("Ranked", bound=RankedPlaces)
@@ -127,4 +130,13 @@ class PlaceRanking(ABC, Generic[Ranked]):
         return f"<{type(self).__name__} in {self.result.case.name}: {self.answer}>"
 
     def _repr_html_(self) -> str:
-        return page(self.page_title(), [self.answer, *self.remarks], self.table())
+        top = headline(self.answer, self._good)
+        return page(self.page_title(), self.remarks, self.table(), verdict=top)
+
+    @property
+    def _good(self) -> bool | None:
+        """Return whether coupled FMUs bear the answer out; None without any, or where it stays unstable."""
+        found = self.result.confirmations
+        if not self.agrees or self.result.breaking:
+            return False
+        return True if found and found[0].stable else None

@@ -15,7 +15,7 @@ from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder
 from orchestrator.linear.signals.identification import IdentifiedMode
 from orchestrator.output.report.column_table import ShownTable
-from orchestrator.output.report.notebook import page
+from orchestrator.output.report.notebook import headline, page
 from orchestrator.output.report.pdf import print_pdf
 from orchestrator.output.report.terminal_tables import PlainTable, make_table
 from orchestrator.output.report.verdict_sentence import VerdictSentence
@@ -214,7 +214,15 @@ class Validation:
         return f"<Validation of {self.result.request.device.name} by {many}: {self.verdict or 'no limits'}>"
 
     def _repr_html_(self) -> str:
-        return page(repr(self).strip("<>"), self.questions, self.table())
+        told = _verdict_of(self.result)
+        top = (
+            headline(_error_alone(self.result), None)
+            if told is None
+            else headline(str(told), told.good)
+        )
+        return page(
+            repr(self).strip("<>").partition(": ")[0], self.questions, self.table(), verdict=top
+        )
 
 
 def _event_json(one: EventComparison) -> dict[str, Any]:
@@ -307,20 +315,37 @@ def _differences(result: ValidationResult) -> Iterator[str]:
 
 
 def _answer(found: Validation) -> str:
-    result = found.result
+    told = _verdict_of(found.result)
+    return (
+        escape(_error_alone(found.result))
+        if told is None
+        else told.markup(_worst_device(found.result))
+    )
+
+
+def _worst_device(result: ValidationResult) -> str:
+    return str(worst_of(_of_both(result)).device.name)
+
+
+def _error_alone(result: ValidationResult) -> str:
     of_both = _of_both(result)
-    name = worst_of(of_both).device.name
-    says = error_sentence(of_both)
+    says, beside = error_sentence(of_both), yardstick_sentence(of_both)
+    return f"{_worst_device(result)}: {says}. {beside} Without --limits there is no verdict."
+
+
+def _verdict_of(result: ValidationResult) -> VerdictSentence | None:
+    """Return the verdict by limits; None without any."""
     if result.verdict is None:
-        beside = yardstick_sentence(of_both)
-        return escape(f"{name}: {says}. {beside} Without --limits there is no verdict.")
+        return None
+    of_both = _of_both(result)
+    says = error_sentence(of_both)
     left = open_sentence(result.criteria, result.devices)
     says += f"; {left}" if left else ""
     if result.verdict is LimitVerdict.MET:
         lasting = lasting_sentence(lasting_errors(of_both), explained=result.request.explain)
         says += f"; {lasting}" if lasting else ""
     word = {"met": "MET", "not met": "NOT MET", "open": "OPEN"}[str(result.verdict)]
-    return VerdictSentence(_GOOD[result.verdict], word, says).markup(name)
+    return VerdictSentence(_GOOD[result.verdict], word, says)
 
 
 def _of_both(result: ValidationResult) -> list[EventComparison]:
