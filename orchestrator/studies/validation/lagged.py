@@ -79,7 +79,8 @@ def _as_cause(comparison: EventComparison, question: Question) -> Iterator[Expla
             value = float(question.figures["delay"])
         case _:
             return
-    noise = math.hypot(*(comparison.noise[name].scatter for name in signals))
+    counted = signals if kind is CauseKind.LAG else ["p", "q"]  # of which the figures are
+    noise = math.hypot(*(comparison.noise[name].scatter for name in counted))
     error, left = float(question.figures["error"]), float(question.figures["left"])
     others = [name for name in ("p", "q") if name not in signals]
     explained = left <= min(_TO_NOISE * noise, _LEAVES[kind] * error)
