@@ -1,0 +1,201 @@
+"""What is told first of an error: the cause by its plainest name, the recording, the model, and the rating in use."""
+
+from dataclasses import replace
+from io import StringIO
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from orchestrator.core.errors import ComponentError
+from orchestrator.studies.validation.causes import CauseKind, Explanation, without_worse_ways
+from orchestrator.studies.validation.limits import Criterion, LimitVerdict, OpenCause
+from orchestrator.studies.validation.over_limit import OverLimit
+from orchestrator.studies.validation.page import _not_judged
+from orchestrator.studies.validation.questions import QuestionKind
+from orchestrator.studies.validation.tables import explanation_table
+from orchestrator.studies.validation.view import parts
+from orchestrator.studies.validation.words import (
+    explanation_sentence,
+    open_sentence,
+    rating_words,
+)
+from tests.studies.validation.made_device import (
+    RATING,
+    TIMES,
+    answer,
+    behind,
+    course,
+    model,
+    recorded,
+    validated,
+)
+
+RIGHT = answer(course() - 1)
+LIMITED = RIGHT * np.minimum(1, 0.52 / np.abs(RIGHT))
+TOLD = {"S_n": RATING}
+OVER = {"over": OverLimit(begin=1.0, length=0.3, largest=1.5)}
+
+
+def screen(found):
+    """What the first screen shows, without its line breaks."""
+    console = Console(file=StringIO(), width=400)
+    for one in parts(found):
+        console.print(one)
+    return console.file.getvalue()
+
+
+def late(signals, seconds=0.03, power=RIGHT):
+    """A power of which P, Q or both come later."""
+
+    def shifted(values, name):
+        return np.interp(TIMES - seconds, TIMES, values) if name in signals else values
+
+    return shifted(power.real, "p") + 1j * shifted(power.imag, "q")
+
+
+@pytest.mark.parametrize(
+    ("signals", "noise_q", "wrong", "name"),
+    [
+        ("p", 1e-4, {}, "P"),
+        ("p", 4e-4, {}, "P"),
+        ("q", 1e-4, {}, "Q"),
+        ("pq", 1e-4, {}, "P and Q"),
+        ("p", 1e-4, {"K": 1.5}, None),
+    ],
+)
+def test_a_delay_that_leaves_noise_alone_is_the_cause_and_one_beside_more_is_not(
+    signals, noise_q, wrong, name
+):
+    found = validated(
+        model(**TOLD, **wrong), recorded(late(signals), noise_q=noise_q), explain=True
+    )
+    best = found.result.explanations[0]
+    assert (best.cause is CauseKind.CLOCK) == (name is not None)
+    if name:
+        assert (best.name, best.value) == (f"delay of {name}", pytest.approx(0.03, abs=1e-3))
+        said = explanation_sentence(found.result.explanations)
+        assert said.startswith(f"The likeliest cause is {name} coming 30 ms later")
+
+
+@pytest.mark.parametrize(("more", "explains"), [({}, True), (OVER, False)])
+def test_no_value_is_named_that_stands_in_for_a_limit_which_the_model_lacks(more, explains):
+    found = validated(model(more=more, **TOLD), recorded(LIMITED), explain=True)
+    causes = found.result.explanations
+    assert causes[0].share > 0.9
+    assert causes[0].explains == explains
+    said = explanation_sentence(causes)
+    assert said.startswith("The likeliest cause" if explains else "No cause is named")
+    assert ("the model lacks a limit" in str(explanation_table(causes).rows)) != explains
+
+
+@pytest.mark.parametrize(("more", "asked"), [({}, True), (OVER, False)])
+def test_no_lag_is_asked_about_beside_a_limit_that_the_model_lacks(more, asked):
+    lagged = behind(RIGHT.real, 0.1) + 1j * RIGHT.imag
+    (comparison,) = validated(model(more=more, **TOLD), recorded(lagged)).result.comparisons
+    assert (QuestionKind.LAGGED in {one.kind for one in comparison.questions}) == asked
+
+
+@pytest.mark.parametrize(
+    ("of_file", "told", "plant", "asks"),
+    [
+        (1500.0, {}, 450.0, True),
+        (1500.0, {"S_n": 1500.0}, 450.0, False),
+        (450.0, TOLD, 450.0, False),
+        (1500.0, {}, 1200.0, False),
+    ],
+)
+def test_a_rating_that_only_the_file_gives_is_said_and_asked_about(of_file, told, plant, asks):
+    """A rating that is off by a fourth may be a wrong reactance as well."""
+    device = model(rating=of_file, **told)
+    found = validated(device, recorded(rating=plant))
+    typed = [one.partition("give --set S_n=")[2] for one in found.questions]
+    assert [*filter(None, typed)] == ["450"] * asks
+    own = "" if told else ", the start value of its file's S_n"
+    assert rating_words(device) == f"{of_file:g} MVA{own}"
+    assert f"[pu of {of_file:g} MVA{own}]" in screen(found)
+
+
+@pytest.mark.parametrize(("gain", "is_noise"), [(2.0, True), (4.0, False)])
+def test_noise_is_told_before_any_value_is_tried(gain, is_noise):
+    """Of this noise the right model's error is less than the scatter before the event."""
+    told = []
+    plant = recorded(answer(course() - 1, K=gain), noise=0.01, seed=2)
+    found = validated(model(**TOLD), plant, report=told.append, explain=True)
+    said = explanation_sentence(found.result.explanations)
+    assert said.startswith("There is nothing to explain") == is_noise
+    assert any("trying" in one for one in told) != is_noise
+
+
+@pytest.mark.parametrize(
+    ("recordings", "devices", "named"),
+    [
+        (("may", "june"), ("a", "a"), "damping, delay of may, damping of june ("),
+        (("may", "may"), ("a", "b"), "damping, delay of may, a, damping of may, b ("),
+        (("may", "may"), ("a", "a"), "damping, delay ("),
+    ],
+)
+def test_open_limits_name_their_recording_and_model_where_there_are_several(
+    recordings, devices, named
+):
+    one = Criterion("", "damping", "%", 1.0, 3.0, 0.0, LimitVerdict.OPEN, "", OpenCause.NO_FIGURE)
+    first, second = (
+        replace(one, recording=recording, device=device)
+        for recording, device in zip(recordings, devices, strict=True)
+    )
+    said = open_sentence([first, replace(first, name="delay"), second], [])
+    assert f"stay open: {named}" in said
+
+
+@pytest.mark.parametrize(
+    ("refuses", "tried", "told"),
+    [("enabled", "enabled = false", True), ("P_0", "P counts into the plant", False)],
+)
+def test_a_reading_that_the_device_refuses_is_in_json_alone_and_a_value_is_told(
+    refuses, tried, told
+):
+    error = ComponentError("made", "fmi2DoStep", "fmi2Error", "too large", 0.1)
+    device = model(more={"refuses": refuses, "error": error}, K=3.0, **TOLD)
+    found = validated(device, recorded(), explain=True)
+    assert tried in [one["tried"] for one in found.as_json()["refused"]]
+    for shown in (screen(found), _not_judged(found.result)):
+        assert (f"{tried} (" in shown) == told
+
+
+@pytest.mark.parametrize("places", [["rec1"], ["rec1, made", "rec1, other"]])
+def test_the_tables_of_the_first_screen_show_each_model_of_a_plant(places):
+    other = replace(model(K=3.0, **TOLD), name="other") if len(places) > 1 else None
+    shown = screen(validated(model(**TOLD), recorded(), beside=other)).partition("Events")[2]
+    events = shown.partition("simulated less measured")[0].splitlines()
+    head, rows = events[2], [line for line in events if "rec1" in line and "MVA" not in line]
+    assert ("Model " in head.partition("Model rings")[0]) == (other is not None)
+    for row, place in zip(rows, places, strict=True):
+        assert all(word in row for word in place.split(", "))
+    titles = [line for line in shown.splitlines() if "simulated less measured" in line]
+    assert [line.partition(":")[0].strip() for line in titles] == places
+
+
+@pytest.mark.parametrize(("left", "first"), [(1.08, "pod_p.enabled"), (1.12, "pod_p.K")])
+def test_a_switch_goes_before_a_number_that_leaves_up_to_a_tenth_less(left, first):
+    number = Explanation(CauseKind.VALUE, "pod_p.K", "pu", 200.0, 0.2, 0.03, 7e-4, noise=5e-5)
+    switch = replace(
+        number,
+        cause=CauseKind.POSITION,
+        name="pod_p.enabled",
+        now=True,
+        value=False,
+        left=left * 7e-4,
+    )
+    assert without_worse_ways([number, switch])[0].name == first
+
+
+@pytest.mark.parametrize("reactance", [0.4, 0.39])
+def test_a_switch_that_is_off_in_the_plant_is_named_as_such_with_what_is_beside_it(reactance):
+    """Beside it a gain of nearly nothing leaves a little less, as it takes some of the other part."""
+    plant = answer(course() - 1, enabled=False, X=reactance)
+    best, *_ = validated(model(**TOLD), recorded(plant), explain=True).result.explanations
+    both = {best.name: best.value, **best.beside}
+    expected = {"enabled": False} | (
+        {} if reactance == 0.4 else {"X": pytest.approx(reactance, rel=1e-2)}
+    )
+    assert both == expected
