@@ -10,8 +10,7 @@ from orchestrator.cases.scenario.measured_points import measured_sources
 from orchestrator.cases.scenario.plants_of_several import plant_sources
 from orchestrator.core.errors import InputError, Problem, QuestionTopic, few
 from orchestrator.core.options import Option
-
-_PHASOR_PORT = ("e_re", "e_im", "y_re", "y_im")  # what a device gives to a network of phasors
+from orchestrator.devices.fmi.port_mapping import PHASOR_PORT
 
 
 @dataclass(frozen=True)
@@ -69,10 +68,10 @@ def _check_forms(draft: Draft, names: list[str]) -> None:
     phasors: dict[str, list[str]] = {}
     for name in names:
         given = draft.system.components[name].description.outputs
-        wanted = {v for v in _PHASOR_PORT if f"{name}.{v}" in taken}
+        wanted = {v for v in PHASOR_PORT if f"{name}.{v}" in taken}
         if wanted - {*given}:
             draft.found.misfits[name] = draft.tables[name].model or draft.tables[name].file or ""
-        elif not wanted and f"{name}.i_re" in taken and {*_PHASOR_PORT} <= {*given}:
+        elif not wanted and f"{name}.i_re" in taken and {*PHASOR_PORT} <= {*given}:
             phasors.setdefault(
                 draft.tables[name].model or draft.tables[name].file or "", []
             ).append(name)
@@ -100,7 +99,7 @@ def _remedy(model: str) -> str:
         return f"take {phasor!r}, or model = 'grid' for the network and EMT models for all"
     if model in model_names():
         return "it has no phasor form: take another model, or model = 'grid' for the network and EMT models for all"
-    needed = f"an FMU needs the outputs {', '.join(_PHASOR_PORT)} for that"
+    needed = f"an FMU needs the outputs {', '.join(PHASOR_PORT)} for that"
     return (
         f"{needed}, or give the network the model 'grid', a case with `models` by "
         + Option.SET

@@ -20,6 +20,9 @@ from orchestrator.devices.fmi.description import FmuDescription, VariableInfo
 PORT = tuple(variable.name for variable in (*INPUTS, *OUTPUTS))
 """Variables of the port; their places are their value references."""
 
+PHASOR_PORT = ("e_re", "e_im", "y_re", "y_im")
+"""What a phasor model gives to a network of phasors: an emf behind an admittance."""
+
 START = tuple(variable.name for variable in START_VALUES)
 
 _SAME = 0.01

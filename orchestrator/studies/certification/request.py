@@ -10,7 +10,7 @@ from orchestrator.core.asked import as_number
 from orchestrator.core.errors import InputError
 from orchestrator.core.options import Option
 from orchestrator.devices.binding.binding import bound_fmu
-from orchestrator.devices.fmi.port_mapping import BoundDescription
+from orchestrator.devices.fmi.port_mapping import PHASOR_PORT, BoundDescription
 from orchestrator.devices.fmi.values import as_text
 
 # values of X_L in the norm [pu, 100 MVA]
@@ -72,6 +72,19 @@ def rated_frequency(request: CertificationRequest, wanted: float) -> float:
     if isinstance(description, BoundDescription):
         return description.port.f_n
     return wanted if "f_n" in description.variables else 50.0
+
+
+def refuse_phasors(request: CertificationRequest) -> None:
+    """Refuse a phasor model, which the tests' networks would fail for what it is and not for what it does.
+
+    Raises an `InputError` if the FMU gives an emf behind an admittance."""
+    if {*PHASOR_PORT} <= {*bound_fmu(request.fmu, request.binding).outputs}:
+        raise InputError(
+            f"{request.fmu}: it is a phasor model (its outputs {', '.join(PHASOR_PORT)} are an emf behind an "
+            "admittance), and the networks of the codes' tests are EMT ones, whose voltage its current would follow "
+            "at once; give the converter's EMT model. `gfor modes` tells the damping of a phasor model in a case "
+            "whose network is of phasors"
+        )
 
 
 def read_reactances(text: str) -> tuple[float, ...]:

@@ -19,7 +19,11 @@ from orchestrator.studies.certification.damping_controllers import (
 from orchestrator.studies.certification.judgement import judge
 from orchestrator.studies.certification.pod_effect import off_values, with_pod
 from orchestrator.studies.certification.point import CONVERTER, CertificatePointTask, compute_point
-from orchestrator.studies.certification.request import CertificationRequest, rated_frequency
+from orchestrator.studies.certification.request import (
+    CertificationRequest,
+    rated_frequency,
+    refuse_phasors,
+)
 from orchestrator.studies.points.executor import Executor
 from orchestrator.studies.points.points import CountReport, Work, nobody
 from orchestrator.studies.points.task import StudyCase
@@ -30,6 +34,7 @@ def certify(
     request: CertificationRequest, executor: Executor, folder: Path, report: CountReport = nobody
 ) -> Certificate:
     request.check()
+    refuse_phasors(request)
     description = bound_fmu(request.fmu, request.binding)
     controllers = damping_controllers(description, request)
     first = {"grid.X_L": request.reactances[0]}

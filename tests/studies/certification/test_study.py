@@ -24,6 +24,8 @@ from orchestrator.linear.spectra.modes import damping_ratio
 from orchestrator.studies.certification import point as point_module
 from orchestrator.studies.certification import study as study_module
 from orchestrator.studies.certification.case_file import write_case
+from orchestrator.studies.certification.codes.certificate import certify_code
+from orchestrator.studies.certification.codes.known import code_for
 from orchestrator.studies.certification.figures import fit_errors_of, linearised_of
 from orchestrator.studies.certification.files import figures_of, save
 from orchestrator.studies.certification.judgement import judge, watched
@@ -154,6 +156,20 @@ def test_an_fmu_of_60_hz_is_told_its_codes(tmp_path, fmu_path):
         InputError, match="rated at 60 Hz, and NTS 631 is a code of 50 Hz; of 60 Hz are --code miso"
     ):
         certify(CertificationRequest(fmu_path("gfor"), None, {"f_n": 60.0}), None, tmp_path)
+
+
+@pytest.mark.parametrize(
+    "tested",
+    [
+        lambda request, folder: certify(request, None, folder),
+        lambda request, folder: certify_code(request, code_for("miso", {}), None, folder),
+    ],
+)
+def test_a_phasor_model_is_not_failed_for_a_network_where_it_cannot_stand(
+    tmp_path, fmu_path, tested
+):
+    with pytest.raises(InputError, match=r"it is a phasor model .* give the converter's EMT model"):
+        tested(CertificationRequest(fmu_path("gfor_phasor")), tmp_path)
 
 
 def test_what_cannot_be_used_is_said_at_once(tmp_path, fmu_path, capsys):

@@ -11,7 +11,11 @@ from orchestrator.studies.certification.certificate import Certificate, refusing
 from orchestrator.studies.certification.codes.bench_point import BenchTask, compute_row, write_row
 from orchestrator.studies.certification.codes.row import CodeRow, GridCode
 from orchestrator.studies.certification.codes.row_verdict import judge_row, try_criteria
-from orchestrator.studies.certification.request import CertificationRequest, rated_frequency
+from orchestrator.studies.certification.request import (
+    CertificationRequest,
+    rated_frequency,
+    refuse_phasors,
+)
 from orchestrator.studies.points.executor import Executor
 from orchestrator.studies.points.points import CountReport, Work, nobody
 from orchestrator.studies.points.task import StudyCase
@@ -31,6 +35,7 @@ def certify_code(
 
     Raises an `InputError` if a criterion cannot judge its row, before anything runs."""
     request.check()
+    refuse_phasors(request)
     f_n = rated_frequency(request, code.f_n)
     try_criteria(code, f_n)
     chosen = [row for row in code.rows if not rows or row.name in rows]
