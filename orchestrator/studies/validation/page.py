@@ -8,12 +8,23 @@ from html import escape
 from orchestrator.core.safe_files import file_hash
 from orchestrator.output.report.colours import colour
 from orchestrator.output.report.html.charts import ChartCurve, legend, line_chart, thinned
-from orchestrator.output.report.html.elements import Figures, bullet_list, document, table
+from orchestrator.output.report.html.elements import (
+    SHADES,
+    Figures,
+    bullet_list,
+    document,
+    table,
+)
+from orchestrator.studies.validation.answer import (
+    error_alone,
+    of_both,
+    verdict_of,
+    worst_device,
+)
 from orchestrator.studies.validation.causes import nothing_to_explain
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import EventComparison
 from orchestrator.studies.validation.figures import SIGNALS
-from orchestrator.studies.validation.lasting import lasting_errors
 from orchestrator.studies.validation.limits import LimitVerdict
 from orchestrator.studies.validation.study import ValidationResult
 from orchestrator.studies.validation.tables import (
@@ -24,16 +35,12 @@ from orchestrator.studies.validation.tables import (
 )
 from orchestrator.studies.validation.words import (
     difference_sentence,
-    error_sentence,
     explanation_sentence,
     fit_sentence,
     interval_head,
-    lasting_sentence,
-    open_sentence,
     rating_words,
     sentence,
     untold_words,
-    worst_of,
     yardstick_sentence,
 )
 
@@ -63,22 +70,22 @@ def validation_page(result: ValidationResult) -> str:
     if result.fit is not None:
         chapters.append(("Fit", _fit(result)))
     chapters.append(("Procedure, and what was not judged", _not_judged(result)))
-    verdict = "no verdict: no limits were given" if result.verdict is None else str(result.verdict)
-    of_both = [*result.comparisons, *result.others]
-    worst = worst_of(of_both).device.name
-    says = [f"Limits: {verdict}.", f"{worst}: {error_sentence(of_both)}."]
-    says.append(yardstick_sentence(of_both))
-    left = open_sentence(result.criteria, result.devices)
-    says += [f"{left}."] if left else []
-    if result.verdict is LimitVerdict.MET:
-        lasting = lasting_sentence(lasting_errors(of_both), explained=result.request.explain)
-        says += [f"{lasting[0].upper()}{lasting[1:]}."] if lasting else []
+    told = verdict_of(result)
+    answer = (
+        error_alone(result)
+        if told is None
+        else f"{told.word}: {worst_device(result)}: {told.text}."
+    )
+    shade = SHADES[None if told is None else told.good]
+    says = [] if told is None else [yardstick_sentence(of_both(result))]
     places = [one for one in result.apart if one.more_than_from_record]
     if places:
         says.insert(0, difference_sentence(places))
     says += [_causes_said(result)] if result.request.explain else []
     listed_says = "".join(f"<li>{escape(one)}</li>" for one in says)
-    findings = f'<div class="findings"><ul>{listed_says}</ul></div>'
+    below = f"<ul>{listed_says}</ul>" if says else ""
+    first = f'<p class="verdict"><b class="{shade}">{escape(answer)}</b></p>'
+    findings = f'<div class="findings">{first}{below}</div>'
     return document(f"Validation of {device.name}", "by recordings", findings, chapters)
 
 

@@ -18,14 +18,18 @@ from orchestrator.output.report.column_table import ShownTable
 from orchestrator.output.report.notebook import headline, page
 from orchestrator.output.report.pdf import print_pdf
 from orchestrator.output.report.terminal_tables import PlainTable, make_table
-from orchestrator.output.report.verdict_sentence import VerdictSentence
 from orchestrator.output.results.file_writers import save_json, save_table
 from orchestrator.output.results.staging import new_run_id, staged
 from orchestrator.studies.signals.signal_modes import doubt_text
+from orchestrator.studies.validation.answer import (
+    error_alone,
+    of_both,
+    verdict_of,
+    worst_device,
+)
 from orchestrator.studies.validation.causes import nothing_to_explain
 from orchestrator.studies.validation.event import EventComparison
 from orchestrator.studies.validation.fit import Fit
-from orchestrator.studies.validation.lasting import lasting_errors
 from orchestrator.studies.validation.limits import Criterion, LimitVerdict
 from orchestrator.studies.validation.questions import Question
 from orchestrator.studies.validation.study import ValidationResult
@@ -38,23 +42,17 @@ from orchestrator.studies.validation.tables import (
 )
 from orchestrator.studies.validation.words import (
     difference_sentence,
-    error_sentence,
     explanation_sentence,
     fit_sentence,
     interval_head,
-    lasting_sentence,
-    open_sentence,
     rating_words,
     refused_sentence,
     sentence,
     swing_cell,
     untold_words,
     value_text,
-    worst_of,
-    yardstick_sentence,
 )
 
-_GOOD = {LimitVerdict.MET: True, LimitVerdict.NOT_MET: False, LimitVerdict.OPEN: None}
 _POWERS = ("p", "q")
 _SHOWN = 8  # criteria that are listed on the first screen
 
@@ -214,9 +212,9 @@ class Validation:
         return f"<Validation of {self.result.request.device.name} by {many}: {self.verdict or 'no limits'}>"
 
     def _repr_html_(self) -> str:
-        told = _verdict_of(self.result)
+        told = verdict_of(self.result)
         top = (
-            headline(_error_alone(self.result), None)
+            headline(error_alone(self.result), None)
             if told is None
             else headline(str(told), told.good)
         )
@@ -275,7 +273,7 @@ def parts(found: Validation) -> Iterator[RenderableType]:
     yield _answer(found)
     yield _events_table(result)
     yield from _doubted_modes(result)
-    for one in _of_both(result):
+    for one in of_both(result):
         yield _windows_table(one, by_device=bool(result.others))
     if result.others:
         yield beside_table(result)
@@ -315,45 +313,12 @@ def _differences(result: ValidationResult) -> Iterator[str]:
 
 
 def _answer(found: Validation) -> str:
-    told = _verdict_of(found.result)
+    told = verdict_of(found.result)
     return (
-        escape(_error_alone(found.result))
+        escape(error_alone(found.result))
         if told is None
-        else told.markup(_worst_device(found.result))
+        else told.markup(worst_device(found.result))
     )
-
-
-def _worst_device(result: ValidationResult) -> str:
-    return str(worst_of(_of_both(result)).device.name)
-
-
-def _error_alone(result: ValidationResult) -> str:
-    of_both = _of_both(result)
-    says, beside = error_sentence(of_both), yardstick_sentence(of_both)
-    return f"{_worst_device(result)}: {says}. {beside} Without --limits there is no verdict."
-
-
-def _verdict_of(result: ValidationResult) -> VerdictSentence | None:
-    """Return the verdict by limits; None without any."""
-    if result.verdict is None:
-        return None
-    of_both = _of_both(result)
-    says = error_sentence(of_both)
-    left = open_sentence(result.criteria, result.devices)
-    says += f"; {left}" if left else ""
-    if result.verdict is LimitVerdict.MET:
-        lasting = lasting_sentence(lasting_errors(of_both), explained=result.request.explain)
-        says += f"; {lasting}" if lasting else ""
-    word = {"met": "MET", "not met": "NOT MET", "open": "OPEN"}[str(result.verdict)]
-    return VerdictSentence(_GOOD[result.verdict], word, says)
-
-
-def _of_both(result: ValidationResult) -> list[EventComparison]:
-    """The comparisons of the model, and of the other one of the plant where there is one, recording by recording."""
-    if not result.others:
-        return list(result.comparisons)
-    pairs = zip(result.comparisons, result.others, strict=True)
-    return [one for pair in pairs for one in pair]
 
 
 def _doubted_modes(result: ValidationResult) -> Iterator[str]:
@@ -380,7 +345,7 @@ def _events_table(result: ValidationResult) -> PlainTable:
     rows = []
     if result.others:
         columns = (columns[0], "Model", *columns[1:])
-    for one in _of_both(result):
+    for one in of_both(result):
         label = one.event.recording.label
         model = [one.device.name] if result.others else []
         _, signal, figures = one.largest_error

@@ -1,6 +1,8 @@
 """What is told first of an error: the cause by its plainest name, the recording, the model, and the rating in use."""
 
+import re
 from dataclasses import replace
+from html import unescape
 from io import StringIO
 
 import numpy as np
@@ -9,7 +11,12 @@ from rich.console import Console
 
 from orchestrator.core.errors import ComponentError
 from orchestrator.studies.validation.causes import CauseKind, Explanation, without_worse_ways
-from orchestrator.studies.validation.limits import Criterion, LimitVerdict, OpenCause
+from orchestrator.studies.validation.limits import (
+    Criterion,
+    LimitVerdict,
+    OpenCause,
+    read_limits,
+)
 from orchestrator.studies.validation.over_limit import OverLimit
 from orchestrator.studies.validation.page import _not_judged
 from orchestrator.studies.validation.questions import QuestionKind
@@ -199,3 +206,22 @@ def test_a_switch_that_is_off_in_the_plant_is_named_as_such_with_what_is_beside_
         {} if reactance == 0.4 else {"X": pytest.approx(reactance, rel=1e-2)}
     )
     assert both == expected
+
+
+@pytest.mark.parametrize(
+    ("limit", "shade", "word"),
+    [(1.0, "good", "MET"), (1e-3, "bad", "NOT MET"), (None, "soft", "made: the largest error")],
+)
+def test_the_page_begins_with_the_first_line_of_the_terminal(
+    limit, shade, word, tmp_path, monkeypatch
+):
+    monkeypatch.setattr("orchestrator.studies.validation.page.file_hash", str)  # there is no file
+    file = tmp_path / "limits.toml"
+    file.write_text(f'source = "a test"\n[windows.after.p]\nmean_abs_error = {limit}\n')
+    limits = None if limit is None else read_limits(file)
+    found = validated(model(K=2.2, **TOLD), recorded(), limits=limits)
+    head = re.search(r'<p class="verdict"><b class="(\w+)">(.*?)</b>', found.html())
+    said = unescape(head[2]).translate({0xA0: " ", 0x2212: "-"}).rstrip(".")
+    assert head[1] == shade
+    assert said.startswith(word)
+    assert said in " ".join(screen(found).split())
