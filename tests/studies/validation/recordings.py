@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 
 import orchestrator as gfor
+from orchestrator.studies.validation.limits import EXAMPLE
 from tests.support.once import computed_once
 
 EVENT = {"time": 1.0, "component": "grid", "type": "load_change", "load": "load_2", "scale": 1.08}
@@ -74,6 +75,14 @@ def written(frame, folder, name="rec.csv"):
     path = folder / name
     frame.to_csv(path, index=False, float_format="%.9g")
     return path
+
+
+def limits_of_errors(folder):
+    """The example's limits without those of a ring-down, which a recording of a few seconds leaves open."""
+    errors, _, _ = EXAMPLE.read_text(encoding="utf-8").partition("[ring_down.p]")
+    file = folder / "limits.toml"
+    file.write_text(errors, encoding="utf-8")
+    return file
 
 
 def waves(frame, kilovolt=230.0):

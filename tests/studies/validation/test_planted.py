@@ -13,7 +13,15 @@ from orchestrator.studies.validation.limits import EXAMPLE
 from orchestrator.studies.validation.questions import QuestionKind
 from orchestrator.studies.validation.record import PortBases, read_recording
 from orchestrator.studies.validation.words import sentence
-from tests.studies.validation.recordings import SOLVER, of_pmu, run, table, waves, with_noise
+from tests.studies.validation.recordings import (
+    SOLVER,
+    limits_of_errors,
+    of_pmu,
+    run,
+    table,
+    waves,
+    with_noise,
+)
 from tests.support.late import LateLibrary
 
 scipy_signal = LateLibrary("scipy.signal")
@@ -475,11 +483,11 @@ def test_a_filled_gap_is_told_and_counts_as_missing(good):
     assert after["max_error_pu"].item() < 0.006
 
 
-def test_a_gap_at_the_event_leaves_no_verdict(good):
+def test_a_gap_at_the_event_leaves_no_verdict(good, tmp_path):
     gaps = {"missing": without(good, 0.98, 1.06), "none": good}
     verdicts = {
         name: gfor_in_python.validate(
-            "gfor", frame.set_index("time"), values=ON, limits=EXAMPLE
+            "gfor", frame.set_index("time"), values=ON, limits=limits_of_errors(tmp_path)
         ).verdict
         for name, frame in gaps.items()
     }
