@@ -40,10 +40,8 @@ def certify(
     first = {"grid.X_L": request.reactances[0]}
 
     def laid(place: Path, before: int) -> dict[str, PreparedScenario]:
-        case, found = (
-            write_case(request, controllers.settings, place),
-            dict[str, PreparedScenario](),
-        )
+        case = write_case(request, controllers.settings, place)
+        found: dict[str, PreparedScenario] = {}
         for k, name in enumerate((WITHOUT, WITH), start=before + 1):
             tell_doing(f"scenario {name} of the code's case, {k} of 4; the first use builds models")
             found[name] = case.prepare([name], first)[0]

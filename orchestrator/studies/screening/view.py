@@ -28,10 +28,10 @@ from orchestrator.output.report.html.charts import (
     legend,
     line_chart,
 )
-from orchestrator.output.report.html.elements import SHADES, Figures, document
+from orchestrator.output.report.html.elements import SHADES, Figures, document, verdict_paragraph
 from orchestrator.output.report.mode_tables import LEAST_DAMPING, damping, eigenvalue_text
 from orchestrator.output.report.notebook import headline, page
-from orchestrator.output.report.short_texts import kinds_of
+from orchestrator.output.report.short_texts import first_sentence, kinds_of
 from orchestrator.output.results.file_writers import save_json
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.output.results.staging import new_run_id, staged
@@ -72,8 +72,8 @@ MODES = "modes.csv"
 SUMMARY = "screening.json"
 PAGE = "screening.html"
 
-_CLAUSE = re.compile(r"; |: (?=\d)|\. (?=[A-Z])")
-"""Ends the first clause of a cause: a remedy follows, further figures, or a sentence more."""
+_CLAUSE = re.compile(r"; |: (?=\d)")
+"""Ends the first clause of a sentence: a remedy follows, or further figures."""
 _SHOWN = 4  # kinds of warnings that are listed; the others are counted
 _FEW = 6  # points that are named one by one
 _NAMED = 40  # outages of one cause that are named: a planner looks for each; items.csv has them all
@@ -341,7 +341,7 @@ def _why_unjudged(row: OutageRow) -> str:
     cause = (record.cause or record.text).removeprefix(
         f"{str(record.status).removeprefix('no ')}: "
     )
-    return f"{record.status}: {_CLAUSE.split(cause, maxsplit=1)[0]}"
+    return f"{record.status}: {_CLAUSE.split(first_sentence(cause), maxsplit=1)[0]}"
 
 
 def _who(mode: ModeAt | None) -> str:
@@ -579,7 +579,7 @@ def _page(summary: Summary) -> str:
     verdict = re.sub("`([^`]+)`", r"<code>\1</code>", escape(verdict_sentence(summary)))
     told = "".join(f"<p>{escape(text)}</p>" for text in _lines_behind(summary))
     findings = (
-        f'<div class="findings"><p class="verdict"><b class="{shade}">{verdict}</b></p>{told}'
+        f'<div class="findings">{verdict_paragraph(shade, verdict)}{told}'
         f'<p class="soft">{escape(sure)}</p></div>'
     )
     return document(title, kind, findings, content, names=plan.prepared.names)

@@ -10,7 +10,7 @@ from typing import Any
 from orchestrator.cases.case import as_typed
 from orchestrator.core.errors import few
 from orchestrator.output.report.column_table import ShownTable
-from orchestrator.output.report.html.elements import document
+from orchestrator.output.report.html.elements import document, verdict_paragraph
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.points.code import code_hash
@@ -214,7 +214,7 @@ def _page(result: MachineSites) -> str:
     title = f"{result.case.table.title or result.case.name}: machines as places of a POD"
     lines = "".join(f"<li>{escape(text)}</li>" for text in (*sureness(result), *remarks(result)))
     shade = "good" if result.agrees and result.confirmations else "soft"
-    verdict = f'<p class="verdict"><b class="{shade}">{escape(answer(result))}</b></p>'
+    verdict = verdict_paragraph(shade, escape(answer(result)))
     findings = f'<div class="findings">{verdict}<ul class="soft">{lines}</ul></div>'
     content = [("All machines", _table_of(result, UNIT, result.ranking).html())]
     kind, names = f"{result.prepared.title}; code {code_hash()[:12]}", result.prepared.names

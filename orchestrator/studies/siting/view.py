@@ -14,7 +14,14 @@ from orchestrator.core.options import Option
 from orchestrator.core.truth import all_true
 from orchestrator.linear.spectra.modes import Mode, damping_percent, damping_ratio
 from orchestrator.output.report.column_table import ShownTable
-from orchestrator.output.report.html.elements import SHADES, Figures, damping, document, table
+from orchestrator.output.report.html.elements import (
+    SHADES,
+    Figures,
+    damping,
+    document,
+    table,
+    verdict_paragraph,
+)
 from orchestrator.output.report.html.network_map import network_map
 from orchestrator.output.report.short_texts import share_text
 from orchestrator.output.results.mode_json import eigenvalue_json
@@ -653,7 +660,7 @@ def _page(result: SiteResult) -> str:
     first, further = answer_in_parts(result)
     behind = f"<p>{escape(_as_sentence(further))}</p>" if further else ""
     findings = (
-        f'<div class="findings"><p class="verdict"><b class="{shade}">{escape(first)}</b></p>{unstable}{behind}'
+        f'<div class="findings">{verdict_paragraph(shade, escape(first))}{unstable}{behind}'
         f'{_confirmed_table(result)}<ul class="soft">{lines}</ul></div>'
     )
     content = [("Map", "".join(_map(result, seen, figures) for seen in result.intact.modes[:3]))]

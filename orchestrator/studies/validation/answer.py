@@ -47,5 +47,4 @@ def verdict_of(result: ValidationResult) -> VerdictSentence | None:
     if result.verdict is LimitVerdict.MET:
         lasting = lasting_sentence(lasting_errors(compared), explained=result.request.explain)
         says += f"; {lasting}" if lasting else ""
-    word = {"met": "MET", "not met": "NOT MET", "open": "OPEN"}[str(result.verdict)]
-    return VerdictSentence(_GOOD[result.verdict], word, says)
+    return VerdictSentence(_GOOD[result.verdict], str(result.verdict).upper(), says)

@@ -20,7 +20,7 @@ from orchestrator.output.results.readers import LINE_FREQUENCY
 from orchestrator.studies.signals.comparison import modes_without_doubts, strongest_modes
 from orchestrator.studies.signals.measured import order_of
 from orchestrator.studies.validation.correlation import correlation_length
-from orchestrator.studies.validation.record import Recording
+from orchestrator.studies.validation.record import LEAST_VOLTAGE, Recording
 from orchestrator.studies.validation.ring_gaps import without_gaps
 from orchestrator.studies.validation.shared_modes import shared_modes
 from orchestrator.studies.validation.windows import Windows
@@ -29,7 +29,6 @@ SIGNALS = ("p", "q", "i_p", "i_q")
 """Active and reactive power, active and reactive current, all in pu of the rating and into the grid."""
 
 CURRENTS = ("i_p", "i_q")
-_LEAST_VOLTAGE = 1e-3  # [pu] at which the noise of a current is that of a power a thousand times
 
 ModePair = tuple[IdentifiedMode | None, IdentifiedMode | None]
 """A mode of the measured signal and the same one of the simulated; None where there is none."""
@@ -245,7 +244,7 @@ def errors_in(
     grows = np.ones(len(inside))
     if signal in CURRENTS:
         before = recording.magnitude[windows.part("before", recording.times)].mean()
-        grows = before / np.maximum(voltage, _LEAST_VOLTAGE)
+        grows = before / np.maximum(voltage, LEAST_VOLTAGE)
     return ErrorFigures(
         max_error=float(np.abs(inside).max()),
         max_at=recording.begin + float(times[worst]),

@@ -14,6 +14,7 @@ from orchestrator.output.report.html.elements import (
     bullet_list,
     document,
     table,
+    verdict_paragraph,
 )
 from orchestrator.studies.validation.answer import (
     error_alone,
@@ -84,8 +85,7 @@ def validation_page(result: ValidationResult) -> str:
     says += [_causes_said(result)] if result.request.explain else []
     listed_says = "".join(f"<li>{escape(one)}</li>" for one in says)
     below = f"<ul>{listed_says}</ul>" if says else ""
-    first = f'<p class="verdict"><b class="{shade}">{escape(answer)}</b></p>'
-    findings = f'<div class="findings">{first}{below}</div>'
+    findings = f'<div class="findings">{verdict_paragraph(shade, escape(answer))}{below}</div>'
     return document(f"Validation of {device.name}", "by recordings", findings, chapters)
 
 

@@ -35,7 +35,7 @@ from orchestrator.studies.validation.transformer import AT_PORT, Between, Beyond
 if TYPE_CHECKING:
     import xarray as xr
 
-_LEAST_VOLTAGE = 1e-3  # [pu] by which a power is divided for its current
+LEAST_VOLTAGE = 1e-3  # [pu] by which a power is divided for its current
 _FEWEST = 20  # samples of a recording that can be compared with anything
 _LONGEST_GAP = 0.25  # gap [s] that a straight line bridges in the voltage that drives the device
 # gap [s] of P or Q beside a known voltage, from which on a swing's largest error may lie in it
@@ -136,7 +136,7 @@ class Recording:
 
         Both are means over the same time: a mean that still holds the power before a fault, over the voltage within it,
         would be a current that never flowed."""
-        return np.asarray(power / np.maximum(self.magnitude, _LEAST_VOLTAGE))
+        return np.asarray(power / np.maximum(self.magnitude, LEAST_VOLTAGE))
 
     def turned(self, hertz: float) -> Recording:
         """The same in a frame that rotates faster by ``hertz``."""

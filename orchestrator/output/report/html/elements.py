@@ -98,6 +98,11 @@ VERDICTS: Mapping[bool | None, str] = {
 }
 
 
+def verdict_paragraph(shade: str, markup: str) -> str:
+    """The verdict on top of a page; ``shade``: one of `SHADES`."""
+    return f'<p class="verdict"><b class="{shade}">{markup}</b></p>'
+
+
 def paragraphs(good: bool | None, texts: Sequence[str]) -> str:
     """Sentences; the first one is the verdict, in the colour of what is good, bad or not known."""
     first, *rest = texts

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from html import escape
 
 from orchestrator.output.report.html.chapters.chapter import Chapter
-from orchestrator.output.report.html.elements import SHADES, table
+from orchestrator.output.report.html.elements import SHADES, table, verdict_paragraph
 from orchestrator.output.report.html.origins import given_in
 from orchestrator.output.report.html.verdict_lines import verdicts
 from orchestrator.output.report.short_texts import short
@@ -46,8 +46,7 @@ def _short_answers(chapters: Sequence[Chapter], notes: dict[str, str], title: st
             return ""
         case [alone]:
             shade, answer = SHADES[alone.good], escape(_as_sentence(alone.answer))
-            verdict = f'<p class="verdict"><b class="{shade}">{answer}</b></p>'
-            return _answer_with_notes(alone, verdict, notes, title)
+            return _answer_with_notes(alone, verdict_paragraph(shade, answer), notes, title)
         case _:
             columns = ["Question", "Answer", "How sure", "Not judged"]
             return table("In short", columns, [_row(one, notes) for one in chapters], left=4)
