@@ -6,10 +6,11 @@ import numpy as np
 from scipy.optimize import fsolve
 
 from fmus.synchronous_generator.composed import synchronous_generator_phasor
-from fmus.toolchain.symbols import Function, symbols
+from fmus.toolchain.frames import Phasor
 from orchestrator.cases.networks.psse.dyr import machine_models
 from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.raw_network import Machine
+from tests.models.closed import Moved, closed
 from tests.support.evaluated import Evaluated
 
 S_BASE = 100.0  # of networks here [MVA]
@@ -137,80 +138,49 @@ class OneMachine:
                 **model.parameters,
             },
         )
+        numbers = ("open_re", "open_im", "impedance_re", "impedance_im")
+        self._model = closed(self.device.model, numbers, _seen, at=0.0)
+
+    def _moved(self):
+        moved = Moved(self._model, self.device)
+        moved.inputs[:] = _parts(self.network.seen(self.network.lines)[:2])
+        return moved
 
     def eigenvalues(self, step=1e-7):
         """Eigenvalues [rad/s] of the machine at its network, by differences about the start."""
-        seen = _parts(self.network.seen(self.network.lines)[:2])
-        x0, (rates, _) = np.array(self.device.x, dtype=float), self._at_network(self.device.p)
-
-        def rate(x):
-            return np.array(rates.values([x.tolist(), seen])[0])
-
-        columns = [
-            (rate(x0 + step * unit) - rate(x0 - step * unit)) / (2 * step)
-            for unit in np.eye(len(x0))
-        ]
-        return np.linalg.eigvals(np.array(columns).T)
-
-    def _at_network(self, p):
-        """Rates, and outputs with the machine's current behind its admittance, as functions at these parameters.
-
-        Their arguments: the states; real and imaginary part of the network's open-circuit voltage, and of its
-        impedance."""
-        model, c = self.device.model, self.device.c
-        x, seen = symbols("x", len(model.states)), symbols("seen", 4)
-        still = _by_name(model, model.outputs_function.of(x, [0.0, 0.0], p, c))
-        current, y = (still["i_re"], still["i_im"]), (still["y_re"], still["y_im"])
-        dropped, turned = _product(seen[2:], current), _product(seen[2:], y)
-        below = 1 + turned[0], -turned[1]  # conjugate
-        size = below[0] * below[0] + below[1] * below[1]
-        v = [part / size for part in _product((seen[0] + dropped[0], seen[1] + dropped[1]), below)]
-        through = _product(y, v)
-        out = [*model.outputs_function.of(x, v, p, c)[0]]
-        out += [current[0] - through[0], current[1] - through[1]]
-        rates = model.derivatives.of(x, v, p, c)[0]
-        return Function("rates", [x, seen], [rates]), Function("outputs", [x, seen], [out])
+        return self._moved().eigenvalues(step)
 
     def run(self, lines, until, event=1.0, every=0.02, changed=None):
         """Outputs and voltages at every so many seconds; the network is ``lines`` alone after the event [s].
 
         ``changed``: values that parameters take at the event."""
-        model, p = self.device.model, self.device.p.copy()
-        names = [v.name for v in model.outputs]
-        seen = self.network.seen(self.network.lines)
-        given, (rates, outputs) = _parts(seen[:2]), self._at_network(p)
-        x = np.array(self.device.x, dtype=float)
+        names = [v.name for v in self.device.model.parameters]
+        seen, moved = self.network.seen(self.network.lines), self._moved()
+        last, at_event, between = (round(t / STEP) for t in (until, event, every))
+        stops = sorted({*range(0, last + 1, between), *([at_event] if at_event <= last else [])})
         rows = []
-
-        def rate(x):
-            return np.array(rates.values([x.tolist(), given])[0])
-
-        for k in range(round(until / STEP) + 1):
-            if k == round(event / STEP):
+        for k, then in zip(stops, [*stops[1:], last], strict=True):
+            if k == at_event:
                 seen = self.network.seen(lines)
-                given = _parts(seen[:2])
+                moved.inputs[:] = _parts(seen[:2])
                 for name, value in (changed or {}).items():
-                    p[[v.name for v in model.parameters].index(name)] = value
-                    rates, outputs = self._at_network(p)
-            if k % round(every / STEP) == 0:
-                *out, re, im = outputs.values([x.tolist(), given])[0]
-                buses = {bus: a + b * complex(re, im) for bus, (a, b) in seen[2].items()}
-                rows.append((k * STEP, dict(zip(names, out, strict=True)), buses))
-            k1 = rate(x)
-            k2 = rate(x + STEP / 2 * k1)
-            k3 = rate(x + STEP / 2 * k2)
-            k4 = rate(x + STEP * k3)
-            x = x + STEP / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+                    moved.parameters[names.index(name)] = value
+            if k % between == 0:
+                out = moved.outputs()
+                i = complex(out["bus.i_re"], out["bus.i_im"])
+                buses = {bus: a + b * i for bus, (a, b) in seen[2].items()}
+                rows.append((k * STEP, out, buses))
+            moved.advance(STEP, then - k)
         return rows
 
 
-def _by_name(model, outputs):
-    return dict(zip([v.name for v in model.outputs], outputs[0], strict=True))
-
-
-def _product(a, b):
-    """The product of two complex numbers, each as its parts."""
-    return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
+def _seen(still, seen):
+    """Bus voltage of a machine behind its admittance, and the current that the network then sees of it."""
+    open_voltage, impedance = Phasor(*seen[:2]), Phasor(*seen[2:])
+    current, Y = Phasor(still["i_re"], still["i_im"]), Phasor(still["y_re"], still["y_im"])
+    v = (open_voltage + impedance * current) / (Phasor(1.0, 0.0) + impedance * Y)
+    through = current - Y * v
+    return v, {"bus.i_re": through.re, "bus.i_im": through.im}
 
 
 def _parts(numbers):

@@ -11,8 +11,9 @@ import pytest
 
 from fmus.wecc_renewable.composed import wecc_plant_phasor
 from tests.benchmarks import andes_wind as andes
+from tests.models.closed import AtSource
 from tests.models.parts import refused
-from tests.models.test_wecc_plant_parts import AtSource, parameters
+from tests.models.test_wecc_plant_parts import parameters
 from tests.support.evaluated import Evaluated
 
 PEER = json.loads(andes.PLACE.read_text("utf-8"))

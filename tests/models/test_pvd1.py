@@ -11,8 +11,8 @@ from orchestrator.cases.networks.psse.dyr import machine_models
 from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.raw_network import Machine
 from tests.benchmarks import andes_pvd1 as andes
+from tests.models.closed import AtSource
 from tests.models.parts import integrated, refused
-from tests.models.test_wecc_plant_parts import AtSource
 from tests.support.evaluated import Evaluated
 
 MODEL = pvd1_phasor()

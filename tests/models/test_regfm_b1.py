@@ -6,6 +6,7 @@ import pytest
 from fmus.regfm_b1.dyr_records import REGFM_B1_RECORDS
 from fmus.regfm_b1.model import regfm_b1_phasor
 from tests.models import by_hand
+from tests.models.closed import AtSource
 from tests.models.parts import integrated, refused
 from tests.support.evaluated import Evaluated
 
@@ -86,51 +87,11 @@ def modelled(flags, **more):
     return Evaluated(regfm_b1_phasor(), GIVEN | at | flags | more), hand
 
 
-class AtSource:
-    """The device behind the network's impedance."""
-
-    def __init__(self, device):
-        self.device, self.names = device, [v.name for v in device.model.outputs]
-
-    def outputs(self, x, v):
-        d = self.device
-        values = d.model.outputs_function(x, [v.real, v.imag], d.p, d.c)
-        return dict(zip(self.names, *values, strict=True))
-
-    def voltage(self, x, source):
-        y = self.outputs(x, 1.0 + 0j)
-        e, Y = complex(y["e_re"], y["e_im"]), complex(y["y_re"], y["y_im"])
-        return (source / Z + e * Y) / (1 / Z + Y)
-
-    def rate(self, x, source):
-        d, v = self.device, self.voltage(x, source)
-        return np.array(d.model.derivatives(x, [v.real, v.imag], d.p, d.c)).ravel()
-
-    def eigenvalues(self, source, h=1e-7):
-        x = np.array(self.device.x)
-        up, down = (
-            np.array([self.rate(x + side * h * unit, source) for unit in np.eye(len(x))])
-            for side in (1, -1)
-        )
-        return np.linalg.eigvals((up - down).T / (2 * h))
-
-    def run(self, source, until, step, name="p"):
-        x, found = np.array(self.device.x), []
-        for _ in range(round(until / step) + 1):
-            found.append(self.outputs(x, self.voltage(x, source))[name])
-            k1 = self.rate(x, source)
-            k2 = self.rate(x + step / 2 * k1, source)
-            k3 = self.rate(x + step / 2 * k2, source)
-            k4 = self.rate(x + step * k3, source)
-            x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-        return np.array(found)
-
-
 @pytest.mark.parametrize("flags", KINDS, ids=str)
 def test_it_rests_and_its_eigenvalues_are_those_of_the_equations_by_hand(flags):
     device, hand = modelled(flags)
     assert not refused(device)
-    at_source = AtSource(device)
+    at_source = AtSource(device, Z)
     bus = at_source.voltage(device.x, hand.source)
     assert abs(bus - FLOW[2] * np.exp(1j * hand.angle)) < 1e-12
     assert max(map(abs, device.rates([bus.real, bus.imag]).values())) < 1e-9
@@ -145,7 +106,7 @@ def test_it_rests_and_its_eigenvalues_are_those_of_the_equations_by_hand(flags):
 def test_its_power_after_a_jump_is_that_of_the_equations_by_hand(flags):
     device, hand = modelled(flags)
     source = hand.source * np.exp(-0.05j)
-    ours = AtSource(device).run(source, 0.5, 1e-3)
+    ours = AtSource(device, Z).run(source, 0.5, 1e-3, "p")
     wanted = hand.run(source, 0.5, 1e-3)
     assert np.ptp(wanted) > 0.1
     assert np.abs(ours - wanted).max() < 1e-3 * np.ptp(wanted)
@@ -154,15 +115,15 @@ def test_its_power_after_a_jump_is_that_of_the_equations_by_hand(flags):
 def test_its_current_in_steady_state_stays_within_its_limit():
     """The network's angle falls away by half a radian: without limits about 1.6 pu would flow."""
     device, hand = modelled({}, kI=20.0, FFlag=0.0, H=0.2)
-    found = AtSource(device).run(hand.source * np.exp(-0.6j), 1.0, 1e-3, "I")
+    found = AtSource(device, Z).run(hand.source * np.exp(-0.6j), 1.0, 1e-3, "I")
     assert max(found[:40]) > 1.0
     assert found[-1] < 1.02
 
 
 def test_its_current_in_a_fault_stays_within_its_limit():
     device, hand = modelled({}, T_seen=1e-3)
-    found = AtSource(device).run(0.3 * hand.source, 0.05, 1e-3, "I")
-    free = AtSource(device).run(0.3 * hand.source, 0.05, 1e-3, "fault_current")
+    outputs = AtSource(device, Z).run(0.3 * hand.source, 0.05, 1e-3, "I", "fault_current")
+    found, free = outputs.T
     acting = [k for k in range(10, 51) if free[k] > 1.0]
     assert len(acting) > 3
     assert found[acting] == pytest.approx(1.6, rel=0.01)

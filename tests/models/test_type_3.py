@@ -6,8 +6,9 @@ import pytest
 from fmus.wecc_renewable import type_3
 from fmus.wecc_renewable.composed import wecc_plant_phasor
 from tests.models import by_hand
+from tests.models.closed import AtSource
 from tests.models.parts import refused
-from tests.models.test_wecc_plant_parts import FAST, SLOW, Z_NETWORK, AtSource
+from tests.models.test_wecc_plant_parts import FAST, SLOW, Z_NETWORK
 from tests.models.two_buses import TwoBuses
 from tests.support.evaluated import Evaluated
 
@@ -128,7 +129,7 @@ def test_it_is_its_equations_by_hand(case):
     assert (outputs["p"], outputs["q"]) == pytest.approx(FLOW[:2], abs=1e-12)
     assert max(map(abs, ours.rates([bus.real, bus.imag]).values())) < 1e-9
     assert max(map(abs, hand.rates(hand.x).values())) < 1e-9
-    found = AtSource(ours).eigenvalues(hand.source)
+    found = AtSource(ours, Z_NETWORK).eigenvalues(hand.source)
     wanted = [z for z in by_hand.eigenvalues(hand.rates, hand.x) if SLOW < abs(z) < FAST]
     assert len(wanted) >= 8
     for z in wanted:
@@ -152,7 +153,7 @@ def test_it_answers_small_changes_alike_up_and_down():
 def test_its_voltage_after_a_jump_is_that_of_the_equations_by_hand():
     ours, hand = both("voltage")
     source = 0.99 * hand.source
-    voltages, by_it = AtSource(ours).run(source, 0.2, 1e-3), hand.run(source, 0.2, 1e-3)
+    voltages, by_it = AtSource(ours, Z_NETWORK).run(source, 0.2, 1e-3), hand.run(source, 0.2, 1e-3)
     assert np.ptp(by_it) > 2e-3
     assert np.abs(voltages - by_it)[20:].max() < 0.02 * np.ptp(by_it)
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fmus.wecc_renewable.composed import wecc_plant_phasor
+from tests.models.closed import AtSource
 from tests.models.parts import refused
 from tests.models.plant_parts_by_hand import Hand
 from tests.support.evaluated import Evaluated
@@ -78,42 +79,6 @@ def modelled(values, **more):
     return Evaluated(wecc_plant_phasor(" ".join(values)), own), hand
 
 
-class AtSource:
-    """A device behind the network's impedance."""
-
-    def __init__(self, device, Z=Z_NETWORK):
-        self.device, self.Z, self.names = device, Z, [v.name for v in device.model.outputs]
-
-    def voltage(self, x, source):
-        d = self.device
-        values = d.model.outputs_function(x, [1.0, 0.0], d.p, d.c)
-        y = dict(zip(self.names, *values, strict=True))
-        e, Y = complex(y["e_re"], y["e_im"]), complex(y["y_re"], y["y_im"])
-        return (source / self.Z + e * Y) / (1 / self.Z + Y)
-
-    def rate(self, x, source):
-        d, v = self.device, self.voltage(x, source)
-        return np.array(d.model.derivatives(x, [v.real, v.imag], d.p, d.c)).ravel()
-
-    def eigenvalues(self, source, h=1e-7):
-        x = np.array(self.device.x)
-        sides = [
-            [self.rate(x + side * h * unit, source) for unit in np.eye(len(x))] for side in (1, -1)
-        ]
-        return np.linalg.eigvals((np.array(sides[0]) - np.array(sides[1])).T / (2 * h))
-
-    def run(self, source, until, step):
-        x, found = np.array(self.device.x), []
-        for _ in range(round(until / step) + 1):
-            found.append(abs(self.voltage(x, source)))
-            k1 = self.rate(x, source)
-            k2 = self.rate(x + step / 2 * k1, source)
-            k3 = self.rate(x + step / 2 * k2, source)
-            k4 = self.rate(x + step * k3, source)
-            x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-        return np.array(found)
-
-
 @pytest.mark.parametrize("name", PLANTS)
 def test_it_rests_at_the_operating_point(name):
     device, hand = modelled(PLANTS[name])
@@ -124,7 +89,7 @@ def test_it_rests_at_the_operating_point(name):
     assert (outputs["p"], outputs["q"]) == pytest.approx((P, Q), abs=1e-12)
     assert max(map(abs, device.rates([bus.real, bus.imag]).values())) < 1e-9
     assert max(map(abs, hand.rates(hand.x).values())) < 1e-11
-    assert abs(AtSource(device).voltage(device.x, hand.source) - bus) < 1e-12
+    assert abs(AtSource(device, Z_NETWORK).voltage(device.x, hand.source) - bus) < 1e-12
 
 
 SLOW, FAST = 1e-3, 60.0  # eigenvalues [1/s] between which both are compared
@@ -134,7 +99,7 @@ SLOW, FAST = 1e-3, 60.0  # eigenvalues [1/s] between which both are compared
 def test_its_eigenvalues_are_those_of_the_equations_by_hand(name):
     """The terminal voltage is that of the same instant there, and behind lags of 1 ms here."""
     device, hand = modelled(PLANTS[name])
-    ours = AtSource(device).eigenvalues(hand.source)
+    ours = AtSource(device, Z_NETWORK).eigenvalues(hand.source)
     wanted = [z for z in hand.eigenvalues() if SLOW < abs(z) < FAST]
     assert len(wanted) >= 4
     for z in wanted:
@@ -145,6 +110,6 @@ def test_its_eigenvalues_are_those_of_the_equations_by_hand(name):
 def test_its_voltage_after_a_jump_is_that_of_the_equations_by_hand(name):
     device, hand = modelled(PLANTS[name])
     source = 0.985 * hand.source
-    ours, wanted = AtSource(device).run(source, 0.6, 1e-3), hand.run(source, 0.6, 1e-3)
+    ours, wanted = AtSource(device, Z_NETWORK).run(source, 0.6, 1e-3), hand.run(source, 0.6, 1e-3)
     assert np.ptp(wanted) > 2e-3
     assert np.abs(ours - wanted)[20:].max() < 0.02 * np.ptp(wanted)

@@ -16,6 +16,7 @@ from fmus.wecc_renewable.model import (
 from orchestrator.cases.networks.psse.dyr import machine_models
 from orchestrator.cases.networks.psse.dyr_file import read_dyr
 from orchestrator.cases.networks.psse.raw_network import Machine
+from tests.models.closed import AtSource
 from tests.models.parts import integrated, refused
 from tests.models.renewable_by_hand import Plant, fields
 from tests.support.evaluated import Evaluated
@@ -84,40 +85,6 @@ def modelled(text, folder, **values):
     return Evaluated(build[found.converter or ""](), {**found.parameters, **given, **values})
 
 
-def at_network(device, until, step=1e-3):
-    """Magnitude of the terminal voltage at every step after the line's trip."""
-    names = [v.name for v in device.model.outputs]
-
-    def voltage(x):
-        v = V_START
-        for _ in range(
-            2
-        ):  # emf and admittance do not depend on it: the second round only shows that
-            y = dict(
-                zip(
-                    names,
-                    *device.model.outputs_function(x, [v.real, v.imag], device.p, device.c),
-                    strict=True,
-                )
-            )
-            e, Y = complex(y["e_re"], y["e_im"]), complex(y["y_re"], y["y_im"])
-            v = (SOURCE / Z + e * Y) / (1 / Z + Y)
-        return v
-
-    def rate(x):
-        v = voltage(x)
-        return device.model.derivatives(x, [v.real, v.imag], device.p, device.c)[0]
-
-    x, found = np.array(device.x), []
-    for _ in range(round(until / step) + 1):
-        found.append(abs(voltage(x)))
-        k1 = rate(x)
-        k2 = rate(x + step * k1 / 2)
-        k3 = rate(x + step * k2 / 2)
-        x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + rate(x + step * k3))
-    return np.array(found)
-
-
 RECORDED = [
     ("rena", {}, 4e-6),
     ("rena_voltage", OF_VOLTAGE, 3e-4),
@@ -164,7 +131,7 @@ def test_the_model_is_the_equations_by_hand(changed, most, tmp_path):
     hand = Plant(fields(tmp_path / "plant.dyr"), P_0, Q_0, V_0)
     wanted = hand.run(SOURCE, Z, 0.3, 1e-3)
     assert np.ptp(wanted) > 300 * most
-    assert np.abs(at_network(device, 0.3) - wanted)[15:].max() < most
+    assert np.abs(AtSource(device, Z).run(SOURCE, 0.3, 1e-3) - wanted)[15:].max() < most
 
 
 # -- dips and limits, at an imposed voltage ---------------------------------------------------------
