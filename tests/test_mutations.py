@@ -1,5 +1,6 @@
 """The list of mutations has not rotted, and the script tells a mistake that is noticed from one that is not."""
 
+import ast
 import subprocess
 from collections import Counter
 from pathlib import Path
@@ -40,6 +41,21 @@ def test_every_mistake_can_still_be_made():
     }
     assert not gone
     assert not [test for test in tests if not (ROOT / test).exists()]
+
+
+def test_every_mistake_leaves_a_program():
+    """Else its tests cannot even be collected, and any test would catch it."""
+    for m in MUTATIONS:
+        text = m.applied((ROOT / m.file).read_text(encoding="utf-8"))
+        if m.file.endswith(".py") and text is not None:
+            ast.parse(text, m.name)
+
+
+def test_indentation_and_line_ends_around_a_mistake_stay():
+    one = Mutation("", "", "    return a\n", "    return b\n", ())
+    assert one.applied("def f():\n    x = 1\n    return a\n") == (
+        "def f():\n    x = 1\n    return b\n"
+    )
 
 
 CODE = """

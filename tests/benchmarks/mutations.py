@@ -56,10 +56,11 @@ class Mutation:
 
     def applied(self, text: str) -> str | None:
         """The file's text with the mistake; None where ``old`` does not occur exactly once, however it is laid out."""
-        places = list(re.finditer(in_any_layout(self.old), text))
+        places = list(re.finditer(in_any_layout(self.old.strip()), text))
         if len(places) != 1:
             return None
-        return text[: places[0].start()] + self.new + text[places[0].end() :]
+        # Indentation and line ends around the text stay as they are in the file.
+        return text[: places[0].start()] + self.new.strip() + text[places[0].end() :]
 
     def key(self, root: Path) -> str:
         """Names what a result rests on: the entry, the file, and the files of tests."""
