@@ -7,6 +7,7 @@ from fmus.grid.grid import grid
 from fmus.grid.network import Line, Load, Network, Port, Shunt
 from fmus.grid.phasor_grid import phasor_grid
 from tests.models.networks import are_the_same, phasors, stepped
+from tests.support.evaluated import Evaluated
 
 OFF, ON = 200, 1200
 """Steps of 0.1 ms after which the shunt is off, and on again."""
@@ -53,6 +54,20 @@ def test_the_network_settles_on_the_admittances(b_mvar):
     for step, connected in ((ON - 1, False), (len(v) - 1, True)):
         wanted = np.linalg.solve(admittance(b_mvar, connected), [i, 0.0])[1]
         assert v[step] == pytest.approx(wanted, abs=1e-4)
+
+
+@pytest.mark.parametrize("connected", [True, False])
+@pytest.mark.parametrize("b_mvar", [90.0, -90.0])
+def test_its_rest_is_that_of_the_admittances(b_mvar, connected):
+    """Rates are linear in the states, so that one solution leads to where all of them are zero."""
+    network_at_rest = Evaluated(grid(network(b_mvar)), {"bank.connected": connected})
+    given = {"unit.i_re": 2.5, "unit.i_im": -0.4}
+    u = np.array([given[v.name] for v in network_at_rest.model.inputs])
+    rates = np.array(list(network_at_rest.rates(u).values()))
+    at_rest = network_at_rest.x - np.linalg.solve(network_at_rest.blocks(u)[0], rates)
+    found = network_at_rest.outputs(u, at_rest)
+    wanted = np.linalg.solve(admittance(b_mvar, connected), [complex(*given.values()), 0.0])[1]
+    assert complex(found["b.v_re"], found["b.v_im"]) == pytest.approx(wanted, abs=1e-9)
 
 
 @pytest.mark.parametrize("make", [grid, phasor_grid])

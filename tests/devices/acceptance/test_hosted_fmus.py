@@ -1,13 +1,17 @@
 """FMUs in a process of their own: what they are given, how long is waited for them, what their current is."""
 
 from ctypes import addressof, c_double, c_uint
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from orchestrator.devices.acceptance.checks import port
+from orchestrator.devices.acceptance.checks.all import CHECKS
+from orchestrator.devices.acceptance.checks.base import failed
 from orchestrator.devices.acceptance.process import HostedComponent
+from orchestrator.devices.acceptance.runner import CRASH, _Runner
 from orchestrator.devices.sandbox import resource_limits
 
 
@@ -44,3 +48,31 @@ def test_a_current_is_that_of_the_rating_with_which_it_runs(monkeypatch):
     )
     assert port.present_current(running) == pytest.approx(0.3 + 0.15j)
     assert port.of_current(running, np.array([[9.0, 0.6, 0.3]])) == pytest.approx([0.3 + 0.15j])
+
+
+@pytest.mark.parametrize(
+    ("fault", "again", "before", "alive", "asked", "told"),
+    [
+        (CRASH, "", ["loads", "reset"], False, 1, True),
+        (CRASH, CRASH, ["loads", "reset"], False, 1, False),
+        (CRASH, "", [], False, 0, False),
+        (CRASH, "", ["loads", "reset"], True, 0, False),
+        ("hang", "", ["loads", "reset"], False, 0, False),
+    ],
+    ids=["not alone", "alone as well", "first of all", "still there", "no crash"],
+)
+def test_a_crash_that_does_not_come_in_a_new_process_is_told_with_what_came_before(
+    fault, again, before, alive, asked, told, monkeypatch
+):
+    answers = []
+    run = object.__new__(_Runner)
+    run._limits, run._asked = SimpleNamespace(seconds=1.0), before
+    run._process = SimpleNamespace(alive=alive)
+    monkeypatch.setattr(
+        run, "_answer", lambda one: answers.append(one) or SimpleNamespace(fault=again)
+    )
+    crashed = failed("state", fault, "its process died")
+    found = run._with_whom(crashed)
+    assert answers == [CHECKS["state"]] * asked
+    more = "; not so in a new process: what came before it, loads, reset, damaged the FMU's memory"
+    assert found == replace(crashed, evidence=crashed.evidence + more * told)

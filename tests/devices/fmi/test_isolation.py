@@ -3,6 +3,7 @@
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,14 +12,15 @@ from fmus.toolchain.compiler import compile_library, joined_source
 from orchestrator import devices
 from orchestrator.core.errors import ComponentError, InputError
 from orchestrator.devices.acceptance.runner import check_fmu
-from orchestrator.devices.fmi import instance
+from orchestrator.devices.fmi import instance, isolated_component
 from orchestrator.devices.fmi.component import RealBatch
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.fmi.instance import is_ours, open_component
-from orchestrator.devices.fmi.isolated_component import IsolatedComponent
+from orchestrator.devices.fmi.isolated_component import _TO_END, IsolatedComponent
 from orchestrator.devices.fmi.loaded_component import LoadedComponent
+from orchestrator.devices.sandbox.mailbox import Client
 from orchestrator.devices.sandbox.process_tree import descendants
-from orchestrator.devices.sandbox.resource_limits import Limits
+from orchestrator.devices.sandbox.resource_limits import TO_BEGIN, Limits
 from orchestrator.systems.coupling.compiled_loop import CompiledLoop
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.recorder import Recorder
@@ -190,6 +192,40 @@ def test_the_beginning_of_our_own_process_is_not_the_fmus_time(box, tmp_path, mo
         initialised(component)
     report = check_fmu(description.path, limits=limits, only=("start_values",))
     assert not report.failures
+
+
+def test_its_answers_have_the_time_of_the_limits_and_its_beginning_that_of_a_beginning(
+    monkeypatch, tmp_path
+):
+    asked = []
+
+    class Begun:
+        """A process that begins at once, and answers nothing."""
+
+        running = False
+
+        def __init__(self, *_, **__):
+            self.box = SimpleNamespace(client=Client(), function=lambda *_: None)
+
+        def close(self):
+            pass
+
+    def remote(self, call, command, *_):
+        asked.append((command, self._box.client.patience))
+
+    monkeypatch.setattr(isolated_component, "ConfinedProcess", Begun)
+    monkeypatch.setattr(isolated_component, "protections", lambda answer: ())
+    monkeypatch.setattr(IsolatedComponent, "_remote", remote)
+    description = SimpleNamespace(path=tmp_path / "box.fmu", guid="{}")
+    monkeypatch.setattr(isolated_component, "runs_under_wine", lambda description: False)
+    with IsolatedComponent("box", description, tmp_path, Limits(seconds=7.0)) as component:
+        component.renew()
+    assert asked == [
+        ("begin", TO_BEGIN),
+        ("instantiate", 7.0),
+        ("release", min(7.0, _TO_END)),
+        ("instantiate", 7.0),
+    ]
 
 
 def test_an_instance_that_cannot_be_made(box):

@@ -10,7 +10,7 @@ import sys
 import tempfile
 import threading
 import time
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -23,10 +23,11 @@ from fmus.toolchain.temporary import remove, sweep
 from orchestrator.core.errors import ComponentError, InputError, NotFiniteError, RunInterruptedError
 from orchestrator.devices.fmi import unpacked
 from orchestrator.simulation.federation import federation as processes
-from orchestrator.simulation.federation import frames
+from orchestrator.simulation.federation import frames, helics_calls
 from orchestrator.simulation.federation.choice import Federates
 from orchestrator.simulation.federation.component import FederatedComponent
 from orchestrator.simulation.federation.frames import JOIN, Door, Frames, call
+from orchestrator.simulation.federation.hub import Hub, _FederationError
 from orchestrator.simulation.federation.layout import claim_ports, make_layout
 from orchestrator.studies.runs.run import run_scenario
 from orchestrator.systems.coupling.master import Master
@@ -505,6 +506,27 @@ def test_the_program_of_the_guide(tmp_path, port, temporary, started):
     np.testing.assert_allclose(np.abs(found), abs(current), rtol=0.02)
     assert "gfor.omega" not in data
     assert "sg1.omega" in data
+
+
+@pytest.mark.parametrize(("granted", "ended"), [(0.25, False), (0.2, True)])
+def test_the_hub_asks_for_its_time_in_seconds(monkeypatch, granted, ended):
+    """Times are whole nanoseconds, and HELICS has seconds; one that grants another time has ended."""
+    asked = []
+
+    def request(federate, seconds):
+        asked.append((federate, seconds, hub._waiting[1]))
+        return granted
+
+    monkeypatch.setattr(
+        helics_calls, "library", lambda: SimpleNamespace(helicsFederateRequestTime=request)
+    )
+    hub = object.__new__(Hub)
+    hub._request, hub._federate = {"patience": 5.0}, "gfor"
+    hub._parts = [{"name": "grid", "slot": 0}, {"name": "load", "slot": 1}]
+    with pytest.raises(_FederationError, match="ended") if ended else nullcontext():
+        hub._request_time(250_000_000, 1)
+    assert asked == [("gfor", pytest.approx(0.25), "load")]
+    assert hub._waiting is None
 
 
 def test_only_who_knows_the_word_comes_in():

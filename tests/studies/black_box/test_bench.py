@@ -1,5 +1,6 @@
 """What a box does at once, measured at a component that is a matrix."""
 
+import ctypes
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -7,9 +8,24 @@ import numpy as np
 import pytest
 
 from orchestrator.core.errors import AnalysisError
+from orchestrator.devices.fmi.many_steps import Steps
 from orchestrator.studies.black_box import bench
 from orchestrator.studies.black_box.bench import Runs
 from orchestrator.studies.black_box.frequency_response import odd_lines
+
+CALLED_STEP = 2
+"""Number of the call that steps, as ``many_steps.h`` has it."""
+
+GET_SET = ctypes.CFUNCTYPE(
+    ctypes.c_int,
+    ctypes.c_void_p,
+    ctypes.POINTER(ctypes.c_uint32),
+    ctypes.c_size_t,
+    ctypes.POINTER(ctypes.c_double),
+)
+DO_STEP = ctypes.CFUNCTYPE(
+    ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int
+)
 
 
 def test_the_direct_effect_is_half_the_difference_of_both_ways(monkeypatch):
@@ -80,3 +96,56 @@ def test_a_device_that_emits_a_line_is_told_apart_from_one_that_is_not_yet_at_re
     run._hold = hold
     with pytest.raises(AnalysisError, match=words):
         run._come_to_rest()
+
+
+@pytest.mark.parametrize(("refused", "told"), [(0.0, None), (0.8, (1, CALLED_STEP))])
+def test_steps_begin_at_their_times_each_behind_its_inputs(refused, told):
+    """Seven steps of 0.1 s were made before; the functions are an FMU's, which may refuse the step from 0.8 s."""
+    calls, inputs, late = [], np.array([[1.0], [2.0], [3.0]]), np.array([[10.0], [20.0], [30.0]])
+    outputs, failed, h = np.zeros((3, 1)), (ctypes.c_int64 * 2)(), 0.1
+
+    def put(_, references, count, values):
+        calls.append(("set", references[0], values[0]))
+        return 0
+
+    def step(_, time, size, keep):
+        calls.append(("step", round(time, 9), size))
+        return 3 * (round(time, 9) == refused)
+
+    def read(_, references, count, values):
+        values[0] = calls[-1][2] + 0.5
+        calls.append(("get", references[0], values[0]))
+        return 0
+
+    put, step, read = GET_SET(put), DO_STEP(step), GET_SET(read)
+    references = (ctypes.c_uint32 * 2)(7, 9)
+    asked = Steps(
+        input_references=ctypes.addressof(references),
+        output_references=ctypes.addressof(references) + ctypes.sizeof(ctypes.c_uint32),
+        n_in=1,
+        n_out=1,
+        inputs=inputs.ctypes.data,
+        late=late.ctypes.data,
+        outputs=outputs.ctypes.data,
+        index=7,
+        count=3,
+        step_size=h,
+    )
+    functions = [ctypes.cast(one, ctypes.c_void_p) for one in (put, read, step)]
+    status = bench._library().drive(None, *functions, ctypes.byref(asked), failed)
+    each = [
+        (
+            ("set", 7, u),
+            ("step", round(0.7 + h * k, 9), h),
+            ("set", 7, 10 * u),
+            ("get", 9, 10 * u + 0.5),
+        )
+        for k, u in enumerate((1.0, 2.0, 3.0))
+    ]
+    if told is None:
+        assert status == 0
+        assert calls == [call for one in each for call in one]
+        assert outputs.ravel().tolist() == [10.5, 20.5, 30.5]
+    else:
+        assert (status, tuple(failed)) == (3, told)
+        assert calls == [*each[0], *each[1][:2]]

@@ -6,7 +6,8 @@ from types import SimpleNamespace
 import pytest
 
 from orchestrator.core.errors import ErrorKind
-from orchestrator.studies.interactions.judgement import JudgedSystem, doubts_of
+from orchestrator.studies.interactions.following import FollowedMode
+from orchestrator.studies.interactions.judgement import JudgedSystem, _with_followed, doubts_of
 from orchestrator.studies.interactions.point import SharedMode, SystemRecord
 from orchestrator.studies.interactions.systems import NONE, WHOLE, Kind, SystemName
 from orchestrator.studies.interactions.view import Interactions, pairs_table, systems_table
@@ -235,6 +236,28 @@ def test_a_mode_of_the_network_alone_does_not_count():
     assert replace(both, converters=frozenset()).least_of_all == resonance
     grows = replace(both, record=system(resonance, shared, growing=mode(-1.0, 50.0, grid=1.0)))
     assert grows.least_damping == pytest.approx(-1.0)
+
+
+def test_a_mode_of_a_pair_counts_in_each_system_to_which_it_was_followed():
+    """It is the mode of the pair's least damping; alone, a vendor takes hardly part in it."""
+    both, own = SystemName(Kind.PAIR, ("A", "B")), SystemName(Kind.ALONE, ("B",))
+    shared, alone, bare = mode(4.0, west=0.3, east=0.3), mode(3.0, sg1=1.0), mode(2.0, sg1=1.0)
+    one = FollowedMode(shared, (None, alone.eigenvalue), bare.eigenvalue)
+    plain = {
+        name: JudgedSystem(name, system(swing), frozenset(converters), 0.05)
+        for name, swing, converters in (
+            (both, shared, {"west", "east"}),
+            (own, alone, {"east"}),
+            (NONE, bare, ()),
+        )
+    }
+    assert plain[own].critical is None
+    found = {name: _with_followed(of, plain, {both: [one]}) for name, of in plain.items()}
+    assert found[both] == plain[both]
+    assert found[own].critical == alone
+    assert found[NONE].critical == bare
+    of_none = {both: [replace(one, together=mode(4.0, sg1=1.0))]}
+    assert _with_followed(plain[own], plain, of_none).critical is None
 
 
 def test_without_any_vendor_the_same_modes_count_as_with_one():

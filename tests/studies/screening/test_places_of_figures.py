@@ -1,5 +1,6 @@
 """From which item and which place the tables, the page and the records of a screening take each figure."""
 
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
@@ -92,6 +93,54 @@ def test_a_stretch_is_joined_by_the_modes_of_its_anchor_and_of_its_last_intact_i
     made = _Worker._record(own, results)
     assert (made.first, made.last, made.last_place) == ("anchor", "one", 1)
     assert (made.items, made.perturbed, made.reused) == (("anchor", "one", "out"), 3, 5)
+
+
+@pytest.mark.parametrize("everywhere", [True, False])
+def test_growth_is_counted_at_the_ends_of_a_stretch_and_between_them_if_asked(
+    everywhere, monkeypatch
+):
+    """The first end is the first item that has modes."""
+    counted = {}
+
+    def computed(item, neighbour, *, count):
+        counted[item] = count
+        return SimpleNamespace(found=None if item == "dark" else object(), record=item)
+
+    monkeypatch.setattr(point, "_reference", lambda items, results, k: None)
+    own = object.__new__(_Worker)
+    own._task = SimpleNamespace(anchor="dark", items=["first", "one", "two", "last"])
+    monkeypatch.setattr(own, "_item", computed)
+    monkeypatch.setattr(own, "_count_the_last", lambda items, results: None)
+    assert [result.record for result in own._pass(everywhere=everywhere)] == [
+        own._task.anchor,
+        *own._task.items,
+    ]
+    assert [item for item, count in counted.items() if not count] == (
+        [] if everywhere else ["one", "two"]
+    )
+
+
+def test_an_anchor_that_is_the_first_item_as_well_is_computed_once(monkeypatch):
+    @dataclass
+    class Record:
+        eigenvalues: tuple
+        reference: int | None = None
+        links: tuple = ()
+
+    asked, modes = [], object()
+
+    def computed(item, neighbour, *, count):
+        asked.append(item)
+        return SimpleNamespace(found=modes, record=Record((-1 + 5j, -2 + 9j)))
+
+    monkeypatch.setattr(point, "_reference", lambda items, results, k: None)
+    own = object.__new__(_Worker)
+    own._task = SimpleNamespace(anchor="one", items=["one", "two"])
+    monkeypatch.setattr(own, "_item", computed)
+    monkeypatch.setattr(own, "_count_the_last", lambda items, results: None)
+    _, again, _ = own._pass(everywhere=False)
+    assert asked == ["one", "two"]
+    assert (again.record, again.found) == (Record((-1 + 5j, -2 + 9j), 0, (0, 1)), modes)
 
 
 def test_the_page_shows_the_figure_not_its_name():

@@ -8,6 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from orchestrator.studies.sweep import plots, tables
+from orchestrator.studies.sweep.trajectories import Beginning
 from orchestrator.studies.sweep.view import ParameterSweep
 from tests.support.scenarios import bare_scenario
 
@@ -107,6 +108,34 @@ def test_failures_are_listed_up_to_a_number_and_the_rest_is_counted(monkeypatch,
     texts = tables.remarks(SimpleNamespace(result=result, axes=()))
     assert len(texts) == 1 + tables._FAILURES_SHOWN + beyond
     assert [text for text in texts if "more" in text] == ["  … and 1 more, in sweep.csv"] * beyond
+
+
+def test_where_a_mode_was_lost_and_begins_anew_is_told_and_no_other_beginning(monkeypatch):
+    monkeypatch.setattr(tables, "place_text", lambda axes, place: f"X_L {place[0]}")
+    monkeypatch.setattr(tables, "warned", lambda samples: [])
+    broken = {0, *range(10, 12 + tables._FAILURES_SHOWN)}
+    points = {
+        (k,): SimpleNamespace(
+            beginning=Beginning.BROKEN if k in broken else Beginning(k % Beginning.BROKEN)
+        )
+        for k in range(20)
+    }
+    sweep = SimpleNamespace(
+        prepared=bare_scenario("gfor"),
+        trajectories=[SimpleNamespace(name="tie", points=points)],
+    )
+    result = SimpleNamespace(
+        plan=SimpleNamespace(idle=()),
+        limits=(),
+        scenarios=[sweep],
+        refined=0,
+        failures=lambda: iter(()),
+    )
+    *shown, rest = tables.remarks(SimpleNamespace(result=result, axes=()))
+    assert [text.partition(", not")[0] for text in shown] == [
+        f"gfor: tie begins at X_L {k}" for k in sorted(broken)[: tables._FAILURES_SHOWN]
+    ]
+    assert rest == "… and 3 more beginnings, marked 'broken' in sweep.csv"
 
 
 def test_a_trajectory_is_told_by_its_ends_and_where_it_is_damped_least_and_most(monkeypatch):

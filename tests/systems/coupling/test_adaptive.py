@@ -64,6 +64,14 @@ def test_the_error_follows_the_tolerance_over_three_decades(schedule):
     assert steps[0] < 0.1 * END / STEP
 
 
+def test_the_counts_are_of_single_steps_of_which_a_pair_has_two():
+    """At the loosest tolerance a pair is as long as the 10 ms between two rows."""
+    counts = within(0.1)[2]
+    assert counts.longest == pytest.approx(5e-3)
+    assert counts.accepted % 2 == 0
+    assert END / counts.longest < counts.accepted < END / counts.shortest
+
+
 def test_rows_stand_at_their_times_and_events_at_theirs():
     """13 steps lie between the event and the row before it."""
     times, values, _ = within(1e-6)
