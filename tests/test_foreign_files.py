@@ -16,9 +16,9 @@ from orchestrator.cases.networks.psse.raw_records import read_records
 from orchestrator.cases.networks.source_changes import Changes, Remark
 from orchestrator.core import foreign_files
 from orchestrator.core.errors import CaseError, InputError
+from orchestrator.core.file_hashes import remembered_sha256, sha256_of
 from orchestrator.core.foreign_files import check_regular, one_line, read_bytes, read_text, visible
 from orchestrator.core.question_kinds import by_kind
-from orchestrator.core.safe_files import file_hash
 from orchestrator.core.toml_files import read_toml
 from orchestrator.devices.fmi.vendor_files import as_fmu
 from orchestrator.output.results.comtrade.reading import read_comtrade
@@ -77,7 +77,8 @@ def case(folder, **parts):
         ("a.cfg", read_comtrade),
         ("a.csv", read_probe_result),
         ("a.dll", as_fmu),
-        ("a.fmu", file_hash),
+        ("a.fmu", sha256_of),
+        ("a.fmu", remembered_sha256),
         ("a.toml", load_case),
     ],
 )
@@ -158,7 +159,6 @@ OWN = {
     "devices.fmi.vendor_files": "is_file before it",
     "studies.added": "the code of an installed distribution",
     "studies.points.code": "our own code",
-    "core.file_hashes": "check_regular before it",
     "output.report.explorer_cells": "results",
     "output.report.html.chapters.files": "results",
     "output.report.html.chapters.devices": "pictures beside a result",

@@ -1,23 +1,16 @@
 """Files that are whole or absent: written beside their place, flushed to the disk, and renamed into it."""
 
 import errno
-import hashlib
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from orchestrator.core.errors import InputError, ResultsError
-from orchestrator.core.foreign_files import read_bytes
 
 inputs: set[Path] = set()  # real paths of the files that the command in force reads
 # begins the names of files that are not finished, and stands in those of folders that are not
 PARTIAL = ".part-"
-
-
-def file_hash(path: Path | None) -> str | None:
-    """SHA-256 of a file; None for none."""
-    return None if path is None else hashlib.sha256(read_bytes(path)).hexdigest()
 
 
 def made_folder(

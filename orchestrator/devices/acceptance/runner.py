@@ -25,8 +25,8 @@ from orchestrator.core.errors import (
     InputError,
     UnsupportedFmuError,
 )
+from orchestrator.core.file_hashes import sha256_of
 from orchestrator.core.options import Option
-from orchestrator.core.safe_files import file_hash
 from orchestrator.devices.acceptance.checks import base
 from orchestrator.devices.acceptance.checks.all import CHECKS, ORDER
 from orchestrator.devices.acceptance.checks.running import RUN_FOR
@@ -121,7 +121,10 @@ class AcceptanceReport:
             "tool": f"gfor-cosim {installed_version('gfor-cosim')}",
             "fmu": str(self.fmu),
             "binding": None if self.binding is None else str(self.binding),
-            "sha256": {"fmu": file_hash(self.fmu), "binding": file_hash(self.binding)},
+            "sha256": {
+                "fmu": sha256_of(self.fmu),
+                "binding": self.binding and sha256_of(self.binding),
+            },
             "trusted": self.trusted,
             "faults": self.faults,
             "reasons": self.reasons,

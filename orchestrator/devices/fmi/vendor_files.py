@@ -10,8 +10,8 @@ from pathlib import Path
 from fmus.toolchain.cache import cache_directory, intact, keep
 from fmus.toolchain.extras import require
 from orchestrator.core.errors import InputError
+from orchestrator.core.file_hashes import sha256_of
 from orchestrator.core.foreign_files import check_regular
-from orchestrator.core.safe_files import file_hash
 from orchestrator.devices.sandbox import wine
 from orchestrator.devices.sandbox.compiled_programs import compile_programs
 
@@ -124,7 +124,7 @@ def _unchanged(kept: Path, path: Path) -> bool:
 
 
 def _hash(place: Path) -> str | None:
-    return file_hash(place) if place.is_file() else None
+    return sha256_of(place) if place.is_file() else None
 
 
 def _archive(members: dict[str, bytes]) -> bytes:

@@ -11,7 +11,7 @@ from orchestrator.cases.form.given import Time, binding_path, case_values, in_se
 from orchestrator.core.asked import check_callable, names, number_in
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError
-from orchestrator.core.file_hashes import sha256_of
+from orchestrator.core.file_hashes import remembered_sha256
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.port_mapping import BoundDescription
@@ -196,7 +196,7 @@ def _read_given(one: Any, number: int, start: Time | None, stop: Time | None) ->
     if not dataset.sizes["time"]:
         raise InputError(f"{label}: it has no sample between start and stop")
     is_file = isinstance(one, str | Path) and Path(one).is_file()
-    return GivenRecording(dataset, label, sha256_of(Path(one)) if is_file else "")
+    return GivenRecording(dataset, label, remembered_sha256(Path(one)) if is_file else "")
 
 
 def _alone(

@@ -166,11 +166,11 @@ def _command_in(words: Sequence[str], listed: Collection[str] = COMMANDS) -> str
 
 
 def _origin(words: Sequence[str], files: Mapping[str, Path]) -> dict[str, Any]:
-    from orchestrator.core.file_hashes import sha256_of  # noqa: PLC0415 - likewise
+    from orchestrator.core.file_hashes import remembered_sha256  # noqa: PLC0415 - likewise
     from orchestrator.output.results.manifest import inputs_behind  # noqa: PLC0415 - likewise
     from orchestrator.studies.points.code import code_hash  # noqa: PLC0415 - only where results are written
 
-    hashes = {name: sha256_of(path) for name, path in files.items()}
+    hashes = {name: remembered_sha256(path) for name, path in files.items()}
     for path in (
         word
         for before, word in pairwise(["", *words])

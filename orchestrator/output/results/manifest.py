@@ -1,6 +1,5 @@
 """``manifest.json``: which run left the files of a folder, and how each of them looked when it was written."""
 
-import hashlib
 import json
 import warnings
 from collections.abc import Collection, Iterable, Mapping
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.core.errors import InputError
+from orchestrator.core.file_hashes import sha256_of
 from orchestrator.output.results import origin
 from orchestrator.output.results.file_writers import save_json, versions_of
 
@@ -63,11 +63,6 @@ class Manifest:
                 f"{path}: its content is not what run {written.run} wrote (SHA-256 differs): it was "
                 f"damaged, changed, or is of another run; {_AGAIN}"
             )
-
-
-def sha256_of(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def write_manifest(

@@ -10,13 +10,13 @@ from secrets import token_hex
 from shutil import copy2, rmtree
 
 from orchestrator.core.errors import InputError
+from orchestrator.core.file_hashes import sha256_of
 from orchestrator.core.options import Option
 from orchestrator.core.safe_files import PARTIAL, flush, inputs, not_written
 from orchestrator.output.results.manifest import (
     MANIFEST,
     Manifest,
     read_manifest,
-    sha256_of,
     write_manifest,
 )
 from orchestrator.output.results.recording_writer import ENDED_EARLY

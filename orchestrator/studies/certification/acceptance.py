@@ -8,8 +8,9 @@ from typing import Any
 
 from fmus.toolchain.extras import installed_version
 from orchestrator.core.errors import InputError
+from orchestrator.core.file_hashes import sha256_of
 from orchestrator.core.options import Option, command
-from orchestrator.core.safe_files import file_hash, write_text
+from orchestrator.core.safe_files import write_text
 
 KEPT = "check.json"  # name of the report's file in a certificate's folder
 
@@ -78,7 +79,7 @@ def read_checks(path: Path, fmu: Path, binding: Path | None) -> Acceptance:
             + command("fmu check", Option.JSON)
             + f"; {remedy}"
         ) from error
-    if hashes != (file_hash(fmu), file_hash(binding)):
+    if hashes != (sha256_of(fmu), binding and sha256_of(binding)):
         raise InputError(
             Option.CHECK + f" {path}: it is of another FMU or binding than {fmu}; {remedy}"
         )

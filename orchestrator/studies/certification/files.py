@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.core.errors import InputError
+from orchestrator.core.file_hashes import sha256_of
 from orchestrator.core.foreign_files import read_text
 from orchestrator.core.options import Option
-from orchestrator.core.safe_files import file_hash, write_text
+from orchestrator.core.safe_files import write_text
 from orchestrator.output.report.pdf import print_pdf
 from orchestrator.output.results.file_writers import save_netcdf
 from orchestrator.output.results.staging import check_free
@@ -53,11 +54,11 @@ def save(c: Certificate, folder: Path, *, pdf: bool = False) -> list[Path]:
     content = {"made": made.isoformat(), **figures_of(c)}
     names = [FMU, *([BINDING] if c.request.binding else []), *case_files(content), RESPONSES]
     hashes = {
-        name: file_hash(folder / name) for name in [*names, *([KEPT] if c.acceptance else [])]
+        name: sha256_of(folder / name) for name in [*names, *([KEPT] if c.acceptance else [])]
     }
     write_text(html, page(c, hashes | {f"{JSON}, its figures": figures_hash(content)}, made))
     printed = [print_pdf(html, folder / PDF)] if pdf else []
-    content["files"] = hashes | {file.name: file_hash(file) for file in (html, *printed)}
+    content["files"] = hashes | {file.name: sha256_of(file) for file in (html, *printed)}
     signatures_of(folder).remove()
     write_sealed(content, target)
     return [html, target, folder / RESPONSES, *printed]

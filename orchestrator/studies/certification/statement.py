@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from orchestrator.core.safe_files import file_hash
+from orchestrator.core.file_hashes import sha256_of
 from orchestrator.devices.fmi.archive import names_in, read_member
 from orchestrator.studies.certification.case_file import FMU
 from orchestrator.studies.certification.compared import Content
@@ -66,7 +66,7 @@ def _digests(folder: Path, content: Content) -> dict[str, str | None]:
 
 
 def _digest(path: Path) -> str | None:
-    return file_hash(path) if is_own_file(path) else None
+    return sha256_of(path) if is_own_file(path) else None
 
 
 def libraries_in(fmu: Path) -> Iterator[tuple[str, str]]:

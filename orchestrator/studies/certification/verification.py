@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.core.errors import InputError
+from orchestrator.core.file_hashes import sha256_of
 from orchestrator.core.late import xr
-from orchestrator.core.safe_files import file_hash
 from orchestrator.output.signatures.checking import State
 from orchestrator.studies.certification.case_file import BINDING, FMU
 from orchestrator.studies.certification.compared import (
@@ -158,7 +158,7 @@ def _compare_file(folder: Path, name: str, wanted: str | None, found: Verificati
         )
     elif wanted is None:
         found.faults.append(f"{name}: {JSON} has no hash of it")
-    elif file_hash(path) != wanted:
+    elif sha256_of(path) != wanted:
         found.faults.append(f"{name}: it is not the file that was certified: its SHA-256 differs")
     else:
         found.agreed.append(f"{name}: SHA-256")

@@ -12,7 +12,7 @@ from orchestrator.cases.case import built_in_cases, load_case
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Complex, Matrix
 from orchestrator.core.errors import InputError, few
-from orchestrator.core.safe_files import file_hash
+from orchestrator.core.file_hashes import sha256_of
 from orchestrator.linear.models.blocks import Blocks
 from orchestrator.linear.models.component_linearization import ComponentLinearization
 from orchestrator.linear.models.linear_model import LinearModel
@@ -157,7 +157,7 @@ def unlike(attributes: Mapping[str, Any], prepared: PreparedScenario) -> str:
     found = ["the case file"] if attributes.get("case_file", case.text) != case.text else []
     for name, content in json.loads(attributes.get("inputs", "{}")).items():
         path = case.directory / name
-        if path != case.path and path.is_file() and file_hash(path) != content:
+        if path != case.path and path.is_file() and sha256_of(path) != content:
             found.append(name)
     if attributes.get("scenario", prepared.name) != prepared.name:
         found.append(f"the scenario ({attributes['scenario']!r}, not {prepared.name!r})")

@@ -12,7 +12,7 @@ from orchestrator.cases.case import BUILT_IN, Case, load_case
 from orchestrator.cases.form.definition import CaseDefinition
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
-from orchestrator.core.file_hashes import sha256_of
+from orchestrator.core.file_hashes import remembered_sha256
 from orchestrator.devices.fmi.converted_component import ConvertedDescription, native
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.port_mapping import BoundDescription
@@ -46,7 +46,7 @@ def component_content(description: FmuDescription) -> list[str]:
     own = native(description)
     port = repr(own.port) if isinstance(own, BoundDescription) else ""
     ways = repr(description.conversions) if isinstance(description, ConvertedDescription) else ""
-    return [sha256_of(description.path), port + ways]
+    return [remembered_sha256(description.path), port + ways]
 
 
 def fingerprint(case: CaseDefinition) -> str:

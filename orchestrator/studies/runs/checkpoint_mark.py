@@ -16,7 +16,7 @@ from fmus.toolchain.extras import installed_version
 from orchestrator.cases.form.locate import place_in
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import few
-from orchestrator.core.file_hashes import sha256_of
+from orchestrator.core.file_hashes import remembered_sha256
 from orchestrator.output.results.origin import files_named
 from orchestrator.studies.points.code import code_hash, library_versions
 from orchestrator.studies.points.key import component_content
@@ -74,7 +74,7 @@ def computed(prepared: PreparedScenario) -> dict[str, str]:
     paths = files_named(case.text, case.directory) | {
         path.name: path for path in sorted(fmus) if path.is_file()
     }
-    files = {name: sha256_of(path) for name, path in paths.items()}
+    files = {name: remembered_sha256(path) for name, path in paths.items()}
     inputs = {case.path.name: hashlib.sha256(case.text.encode()).hexdigest(), **files}
     return {
         "date": f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from html import escape
 
-from orchestrator.core.safe_files import file_hash
+from orchestrator.core.file_hashes import sha256_of
 from orchestrator.output.report.colours import colour
 from orchestrator.output.report.html.charts import ChartCurve, legend, line_chart, thinned
 from orchestrator.output.report.html.elements import (
@@ -96,7 +96,7 @@ def _model(result: ValidationResult) -> str:
 def _model_table(device: PlayedDevice) -> str:
     rows = [
         ["File", escape(device.path.name)],
-        ["SHA-256", file_hash(device.path) or ""],
+        ["SHA-256", sha256_of(device.path)],
         ["Model", escape(device.description.model_name)],
         ["Rating", f"{rating_words(device)}; {device.rated_hz:g} Hz"],
         ["Communication step", f"{1e6 * device.step_size:g} µs"],

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from orchestrator.core.safe_files import file_hash
+from orchestrator.core.file_hashes import sha256_of
 from orchestrator.studies.certification.files import figures_hash, write_sealed
 from orchestrator.studies.certification.kinds import rebuilt
 
@@ -59,7 +59,7 @@ def forged(folder, content):
     page.write_text(
         page.read_text(encoding="utf-8").replace(figures_hash(old), figures_hash(content)), "utf-8"
     )
-    content["files"] = {name: file_hash(folder / name) for name in content["files"]}
+    content["files"] = {name: sha256_of(folder / name) for name in content["files"]}
     del content["seal"]
     write_sealed(content, folder / "certificate.json")
 

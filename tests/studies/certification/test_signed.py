@@ -12,7 +12,7 @@ from cryptography.hazmat.primitives.asymmetric import ec, ed25519, rsa
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 
 import orchestrator as gfor_api
-from orchestrator.core.safe_files import file_hash
+from orchestrator.core.file_hashes import sha256_of
 from orchestrator.face.cli import main
 from orchestrator.output.signatures import ssh_keygen
 from orchestrator.output.signatures.public_key import public_key_of
@@ -77,7 +77,7 @@ def judged_once():
 
     def judged(folder, content, said, views):
         names = {FMU, RESPONSES, HTML, *case_files(content), *content["files"]}
-        files = {name: file_hash(folder / name) for name in names if (folder / name).is_file()}
+        files = {name: sha256_of(folder / name) for name in names if (folder / name).is_file()}
         asked = json.dumps([content, files], sort_keys=True)
         if asked not in known:
             words, shown = [], []
@@ -201,7 +201,7 @@ def edited(folder, change):
     path = folder / "certificate.json"
     content = json.loads(path.read_text(encoding="utf-8"))
     change(content)
-    content["files"] = {name: file_hash(folder / name) for name in content["files"]}
+    content["files"] = {name: sha256_of(folder / name) for name in content["files"]}
     del content["seal"]
     write_sealed(content, path)
 
@@ -382,7 +382,7 @@ def test_the_signature_of_another_certificate_is_one(certificate, keys, signers,
     (other / "converter.fmu").write_bytes(content[:-2] + b"\x01\x00x")  # a comment of the archive
     edited(other, lambda content: None)
     page = other / "certificate.html"
-    page.write_text(page.read_text("utf-8").replace(file_hash(certificate / "converter.fmu"), "0"))
+    page.write_text(page.read_text("utf-8").replace(sha256_of(certificate / "converter.fmu"), "0"))
     for name in signatures_of(certificate).names():
         shutil.copy(certificate / name, other / name)
     code, state, sentence = seen(gfor, other, "--signers", signers())
@@ -727,7 +727,7 @@ def a_file_elsewhere(folder):
     (folder.parent / "elsewhere").write_text("x")
     path = folder / "certificate.json"
     content = json.loads(path.read_text("utf-8"))
-    content["files"]["../elsewhere"] = file_hash(folder.parent / "elsewhere")
+    content["files"]["../elsewhere"] = sha256_of(folder.parent / "elsewhere")
     del content["seal"]
     write_sealed(content, path)
 

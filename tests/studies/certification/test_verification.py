@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 from orchestrator.core.errors import InputError
-from orchestrator.core.safe_files import file_hash
+from orchestrator.core.file_hashes import sha256_of
 from orchestrator.devices.acceptance.checks.all import CHECKS
 from orchestrator.face.cli import main
 from orchestrator.studies.certification import acceptance, kinds, points_again
@@ -356,7 +356,7 @@ def test_what_follows_from_the_files_is_derived_again(certificate, gfor, name):
     edited(
         certificate,
         lambda c: c["files"].update(
-            {"certificate.html": file_hash(certificate / "certificate.html")}
+            {"certificate.html": sha256_of(certificate / "certificate.html")}
         ),
         sealed=True,
     )
@@ -451,7 +451,7 @@ def test_a_report_in_which_nothing_was_passed_is_refused(tmp_path, fmu_path):
         "tool": acceptance._tool(),
         "trusted": True,
         "checks": checks,
-        "sha256": {"fmu": file_hash(fmu), "binding": None},
+        "sha256": {"fmu": sha256_of(fmu), "binding": None},
     }
     path = tmp_path / "check.json"
     path.write_text(json.dumps(report), encoding="utf-8")

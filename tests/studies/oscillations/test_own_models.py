@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import orchestrator as gfor_api
-from orchestrator.core.safe_files import file_hash
+from orchestrator.core.file_hashes import sha256_of
 from orchestrator.studies.oscillations.models import OWN_MODEL, UnitModels
 from orchestrator.studies.oscillations.reading import measurements_of
 from orchestrator.studies.oscillations.unit_models import unlike
@@ -207,7 +207,7 @@ def test_a_run_with_values_of_its_own_is_judged_by_models_with_them(tmp_path):
 def test_a_file_of_the_case_that_was_edited_since_the_run_is_told():
     prepared = gfor_api.load("kundur").scenario("gfor").prepared
     (name,) = (path.name for path in prepared.case.directory.glob("*.csv"))
-    seen = file_hash(prepared.case.directory / name)
+    seen = sha256_of(prepared.case.directory / name)
     assert unlike({"inputs": json.dumps({name: seen, "gone.raw": "1a"})}, prepared) == ""
     assert unlike({"inputs": json.dumps({name: "1a"})}, prepared) == name
 

@@ -215,7 +215,7 @@ def test_a_switch_that_is_off_in_the_plant_is_named_as_such_with_what_is_beside_
 def test_the_page_begins_with_the_first_line_of_the_terminal(
     limit, shade, word, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr("orchestrator.studies.validation.page.file_hash", str)  # there is no file
+    monkeypatch.setattr("orchestrator.studies.validation.page.sha256_of", str)  # there is no file
     file = tmp_path / "limits.toml"
     file.write_text(f'source = "a test"\n[windows.after.p]\nmean_abs_error = {limit}\n')
     limits = None if limit is None else read_limits(file)

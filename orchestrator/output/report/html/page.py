@@ -10,8 +10,9 @@ from typing import Any
 
 from orchestrator.cases.networks.element_names import ElementNames
 from orchestrator.core.errors import InputError, few
+from orchestrator.core.file_hashes import sha256_of
 from orchestrator.core.options import Option
-from orchestrator.core.safe_files import file_hash, write_page
+from orchestrator.core.safe_files import write_page
 from orchestrator.output.report.html import sections, studies
 from orchestrator.output.report.html.chapters.chapter import Chapter
 from orchestrator.output.report.html.chapters.files import chapters_of
@@ -252,7 +253,7 @@ def _changed_since(chapters: Sequence[Chapter]) -> str:
         )
         for name, content in inputs.items():
             there = [file for one in homes if (file := one / name).is_file()]
-            if there and all(file_hash(file) != content for file in there):
+            if there and all(sha256_of(file) != content for file in there):
                 found[name] = source
     names = few((f"{name} (of {source})" for name, source in found.items()), 3)
     return (

@@ -11,7 +11,7 @@ import xarray as xr
 
 from orchestrator.cases.case import load_case
 from orchestrator.core.errors import InputError
-from orchestrator.core.safe_files import file_hash
+from orchestrator.core.file_hashes import sha256_of
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.output.results.file_writers import save_netcdf
 from orchestrator.studies.certification.case_file import BINDING
@@ -96,7 +96,7 @@ def sealed(folder, content):
     for former, now in zip(said, says, strict=True):
         text = text.replace(escape(former), escape(now))
     page.write_text(text.replace(figures_hash(old), figures_hash(content)), encoding="utf-8")
-    content["files"] = {name: file_hash(folder / name) for name in content["files"]}
+    content["files"] = {name: sha256_of(folder / name) for name in content["files"]}
     content["seal"] = seal_of(content)
     (folder / JSON).write_text(json.dumps(content), encoding="utf-8")
     return " ".join(verify_files(*read_certificate(folder)).faults)

@@ -11,7 +11,7 @@ import pytest
 from cryptography.hazmat.primitives.asymmetric import ed25519
 
 from orchestrator.core.errors import InputError
-from orchestrator.core.safe_files import file_hash
+from orchestrator.core.file_hashes import sha256_of
 from orchestrator.output.signatures.checking import State
 from orchestrator.output.signatures.public_key import public_key_of
 from orchestrator.studies.certification.case_file import BINDING, FMU
@@ -117,7 +117,7 @@ def a_linked_fmu(folder, content):
 
 def a_file_elsewhere(folder, content):
     (folder.parent / "elsewhere").write_text("x")
-    content["files"]["../elsewhere"] = file_hash(folder.parent / "elsewhere")
+    content["files"]["../elsewhere"] = sha256_of(folder.parent / "elsewhere")
 
 
 IN_FORCE = {
