@@ -420,10 +420,14 @@ def _doubt_of_mode(found: ModePair, looks: Sequence[ModePair]) -> tuple[float, f
     return float(frequency), float(damping)
 
 
+def _last_seen(windows: Windows) -> float:
+    """The time up to which a ring-down is looked at [s]."""
+    return windows.until - _LAST * (windows.until - windows.end)
+
+
 def _ringing(recording: Recording, values: Numbers, windows: Windows) -> xr.DataArray | None:
     """The part of a signal after the event, thinned; None where it is short or hardly moves."""
-    end = windows.until - _LAST * (windows.until - windows.end)
-    part = (recording.times > windows.end) & (recording.times < end)
+    part = (recording.times > windows.end) & (recording.times < _last_seen(windows))
     if part.sum() < _FEW or np.ptp(values[part]) < _LEAST_MOVES:
         return None
     thin = max(1, round(part.sum() / _MOST_SAMPLES))
@@ -448,7 +452,7 @@ def _modes(
         return []
     slowest = _SLOWEST_PERIODS / (windows.until - windows.end)
     fastest = 0.25 / float(np.median(np.diff(times)))
-    length = float(times[-1] - times[0])
+    length = _last_seen(windows) - windows.end
     return [_doubted(one, length) for one in found if slowest < one.frequency_hz < fastest]
 
 
@@ -512,7 +516,7 @@ def compare_signals(
     """Delay, steps and ring-down of P and Q."""
     measured, own = recording.power, simulated
     rung = without_gaps(recording, windows)
-    length = (1 - _LAST) * (rung.until - rung.end)
+    length = _last_seen(rung) - rung.end
     found = {}
     for name, y, x in (("p", measured.real, own.real), ("q", measured.imag, own.imag)):
         pairs, strong = _compared_rings(recording, (y, x), rung)

@@ -115,6 +115,7 @@ class Reading:
     turns: int = 0  # its three channels do, each by so many places
     unit: str = ""  # that says so, in place of the factor
     rating: float = 0.0  # of the device, that says so [MVA]
+    of_size: bool = False  # P and Q are scaled as they would be by another rating
 
     def fits(self, recording: Recording) -> bool:
         """Return whether a recording may be meant so: it has the channels, in the unit."""
@@ -184,7 +185,7 @@ READINGS_OF_SIGN = (
 )
 READINGS = (
     *READINGS_OF_SIGN,
-    Reading("P and Q are of one phase", ("p", "q"), 3, _power(3, 3), "", _LEAVES),
+    Reading("P and Q are of one phase", ("p", "q"), 3, _power(3, 3), "", _LEAVES, of_size=True),
     Reading("P is of one phase", ("p",), 3, _power(3, 1), "", _LEAVES),
     Reading("Q is of one phase", ("q",), 3, _power(1, 3), "", _LEAVES),
     Reading("P and Q are in each other's place", ("p", "q"), 1, _swapped, "", _LEAVES, swaps=True),
@@ -306,11 +307,14 @@ def _likeliest(comparison: EventComparison, bases: PortBases, error: float) -> l
     least = min(left for left, _ in tried)
     best = next(reading for left, reading in tried if left <= _AS_GOOD * least)
     most = min(best.leaves * error, math.hypot(*rms_movement(event)))
-    remedy = best.remedy(event.recording)
+    remedy, more = best.remedy(event.recording), dict[str, float]()
+    if best.of_size and "S_n" in device.description.variables:
+        more = {"rating": device.rating, "other_rating": device.rating / best.factor}
+    told = {"reading": best.name, "error": error}
     return [
         Question(
             QuestionKind.READ_OTHERWISE,
-            {"reading": best.name, "error": error, "left": trial.rest_of_error, "remedy": remedy},
+            {**told, "left": trial.rest_of_error, "remedy": remedy, **more},
         )
         for trial in _trials_of(device, event, best, bases)
         if trial.rest_of_error <= most
@@ -345,7 +349,8 @@ def _scalings(comparison: EventComparison) -> Iterator[Reading]:
     factor = _whole_factor(*both)
     if factor:
         change = _power(factor, factor)
-        yield Reading(_scale_name("P and Q are", factor), ("p", "q"), factor, change, "", _LEAVES)
+        said = _scale_name("P and Q are", factor)
+        yield Reading(said, ("p", "q"), factor, change, leaves=_LEAVES, of_size=True)
     p, q = _whole_factor(way.real, own.real), _whole_factor(way.imag, own.imag)
     if _is_prefix(p) and not _is_prefix(q):
         yield Reading(_scale_name("P is", p), ("p",), p, _power(p, 1), "", _LEAVES)
@@ -597,5 +602,6 @@ def _clock(comparison: EventComparison, error: float) -> Iterator[tuple[float, Q
         if left <= _CLOCK_LEAVES * error:
             which = " and ".join(signals).upper().replace("AND", "and")
             figures = {"delay": delay, "error": error, "left": left, "together": len(late)}
-            yield left / error, Question(QuestionKind.CLOCKS, figures | {"which": which})
+            of = {"which": which, "signals": list(signals)}
+            yield left / error, Question(QuestionKind.CLOCKS, figures | of)
             return

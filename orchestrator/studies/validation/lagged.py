@@ -72,19 +72,18 @@ def _as_cause(comparison: EventComparison, question: Question) -> Iterator[Expla
     """The lag or delay that a question names, where it leaves noise alone, and no other signal is off."""
     match question.kind:
         case QuestionKind.LAGGED:
-            kind, signals = CauseKind.LAG, list(question.figures["signals"])
-            value = float(question.figures["lag"])
+            kind, value = CauseKind.LAG, float(question.figures["lag"])
         case QuestionKind.CLOCKS:
-            kind, signals = CauseKind.CLOCK, question.figures["which"].lower().split(" and ")
-            value = float(question.figures["delay"])
+            kind, value = CauseKind.CLOCK, float(question.figures["delay"])
         case _:
             return
+    signals = list(question.figures["signals"])  # none where the voltage comes late
     counted = signals if kind is CauseKind.LAG else ["p", "q"]  # of which the figures are
     noise = math.hypot(*(comparison.noise[name].scatter for name in counted))
     error, left = float(question.figures["error"]), float(question.figures["left"])
     others = [name for name in ("p", "q") if name not in signals]
     explained = left <= min(_TO_NOISE * noise, _LEAVES[kind] * error)
-    if explained and not any(_is_off(comparison, name) for name in others):
+    if signals and explained and not any(_is_off(comparison, name) for name in others):
         which = " and ".join(name.upper() for name in signals)
         yield Explanation(
             kind,

@@ -110,7 +110,7 @@ def _event(one: EventComparison, figures: Figures, others: Sequence[EventCompari
         [
             _recording(one),
             *_charts(one, figures, others),
-            _errors(one),
+            *(_errors(each, by_device=bool(others)) for each in (one, *others)),
             bullet_list(map(sentence, one.questions)),
         ]
     )
@@ -150,7 +150,7 @@ def _charts(
         yield figures.add(chart, f"{_NAMES[signal]}, measured and simulated.")[0]
 
 
-def _errors(one: EventComparison) -> str:
+def _errors(one: EventComparison, *, by_device: bool) -> str:
     begin = one.event.recording.begin
     rows = []
     for window, of in one.errors.items():
@@ -160,7 +160,8 @@ def _errors(one: EventComparison) -> str:
             place = f"{window}, {begin + low:.4g} to {begin + high:.4g} s"
             rows.append([place, _NAMES[signal], *(f"{x:.4f}" for x in figures)])
     columns = ["Window", "Signal", "Largest", "Mean", "Mean magnitude", "Largest by noise alone"]
-    return table("Errors [pu of the rating]", columns, rows, left=2)
+    model = f" of {one.device.name}" if by_device else ""
+    return table(f"Errors{model} [pu of the rating]", columns, rows, left=2)
 
 
 def _beside(result: ValidationResult) -> str:

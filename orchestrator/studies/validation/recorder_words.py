@@ -278,7 +278,11 @@ def _lagged(x: Figures) -> str:
 def _read_otherwise(x: Figures) -> str:
     options = (one if one.startswith("--") else _channel(one) for one in x["remedy"])
     given = " ".join(options)
-    return f"{x['reading']}? Read so, {fall_of_error(x)}. If it is so, give {given}"
+    said = f"{x['reading']}? Read so, {fall_of_error(x)}. If it is so, give {given}"
+    if "rating" not in x:
+        return said
+    now, other = (f"{x[name]:.4g} MVA" for name in ("rating", "other_rating"))
+    return f"{said}; a rating of {other} (S_n) in place of {now} would tell the same"
 
 
 def _stuck(x: Figures) -> str:

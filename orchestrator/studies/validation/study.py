@@ -370,20 +370,7 @@ def _find_wanted(request: ValidationRequest) -> Wanted:
         raise InputError(
             Option.HOLD_BACK + ": all recordings are kept back from the fit; leave one to it"
         )
-    _refuse_confirming_itself(request)
     return wanted_parameters(request.device, request.fit, request.bounds)
-
-
-def _refuse_confirming_itself(request: ValidationRequest) -> None:
-    """Refuse a recording that is fitted and kept back as well, unless each has an event of its own in it."""
-    fitted = [one.dataset for one in request.recordings if not one.held_back]
-    for one in filter(lambda given: given.held_back, request.recordings):
-        if len(request.events) <= 1 and any(map(one.dataset.equals, fitted)):
-            raise InputError(
-                Option.HOLD_BACK
-                + f" {one.label}: it is among the recordings that are fitted as well, and would "
-                "confirm itself; give it with " + Option.HOLD_BACK + " alone"
-            )
 
 
 def add_fit(result: ValidationResult, report: Report) -> ValidationResult:

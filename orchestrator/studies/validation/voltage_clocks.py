@@ -64,7 +64,7 @@ def ask_of_voltage_clocks(comparison: EventComparison) -> Iterator[tuple[float, 
     if rest <= _LEAVES * error:
         late = delay if part == "magnitude" else -delay
         figures = {"which": f"V's {part}", "delay": late, "error": error, "left": rest}
-        yield rest / error, Question(QuestionKind.CLOCKS, figures | {"together": 0})
+        yield rest / error, Question(QuestionKind.CLOCKS, figures | {"together": 0, "signals": []})
 
 
 def delay_of_magnitude(recording: Recording, windows: Windows) -> float:

@@ -3,13 +3,9 @@
 from types import SimpleNamespace
 
 import pytest
-import xarray as xr
 
-from orchestrator.core.errors import InputError
 from orchestrator.studies.validation.study import (
     FitCheck,
-    GivenRecording,
-    _refuse_confirming_itself,
     with_agreement,
 )
 from orchestrator.studies.validation.words import fit_sentence
@@ -41,16 +37,3 @@ def test_an_event_kept_back_agrees_or_not(fitted, kept, word, agrees):
     sentence, in_json = said(fitted, kept)
     assert word in sentence
     assert in_json is agrees
-
-
-def test_a_recording_that_is_fitted_confirms_no_fit():
-    """Each of two events in one file is another matter."""
-    may, june = (xr.Dataset({"p": ("time", [0.9, last])}) for last in (1.0, 1.1))
-    given = [GivenRecording(may, "may"), GivenRecording(may.copy(), "may", held_back=True)]
-    events = [(1.0, 1.1), (5.0, 5.1)]
-    for some in ([], events[:1]):
-        with pytest.raises(InputError, match="may: it is among the recordings that are fitted"):
-            _refuse_confirming_itself(SimpleNamespace(recordings=given, events=some))
-    _refuse_confirming_itself(SimpleNamespace(recordings=given, events=events))
-    others = [given[0], GivenRecording(june, "june", held_back=True)]
-    _refuse_confirming_itself(SimpleNamespace(recordings=others, events=[]))

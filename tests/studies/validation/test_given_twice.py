@@ -1,5 +1,7 @@
 """What is read of a recording's files: one that is given twice, headings as they are written, a rated voltage."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,6 +11,7 @@ from orchestrator.core.errors import InputError
 from orchestrator.output.results.csv_recording import read_table
 from orchestrator.studies.validation.event import prepare_event
 from orchestrator.studies.validation.record import PortBases, read_recording
+from orchestrator.studies.validation.study import GivenRecording, events_of
 
 BASES = PortBases(1500.0, 50.0)
 
@@ -39,6 +42,23 @@ def test_a_recording_that_is_given_twice_neither_counts_twice_nor_confirms(given
         gfor_in_python.validate(
             "gfor_phasor", recordings, values={"pod_p.enabled": True}, step="1 ms", **given
         )
+
+
+def test_two_events_of_one_file_are_two():
+    dataset = dipped().to_xarray()
+    given = [GivenRecording(dataset, "may"), GivenRecording(dataset, "may", held_back=True)]
+
+    def found(*events):
+        return events_of(
+            SimpleNamespace(
+                recordings=given, bases=BASES, channels=(), place=None, events=list(events)
+            )
+        )
+
+    assert len(found((1.0, 1.1), (2.0, 2.1))) == 2
+    for same in ([], [(1.0, 1.1)]):
+        with pytest.raises(InputError, match=r"--hold-back may: .* confirms nothing"):
+            found(*same)
 
 
 def asked(frame):

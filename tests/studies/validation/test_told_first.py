@@ -26,6 +26,7 @@ from orchestrator.studies.validation.words import (
     explanation_sentence,
     open_sentence,
     rating_words,
+    sentence,
 )
 from tests.studies.validation.made_device import (
     RATING,
@@ -225,3 +226,28 @@ def test_the_page_begins_with_the_first_line_of_the_terminal(
     assert head[1] == shade
     assert said.startswith(word)
     assert said in " ".join(screen(found).split())
+
+
+@pytest.mark.parametrize("told", [{}, {"S_n": 3 * RATING}])
+def test_a_rating_three_times_too_large_is_told_beside_a_power_of_one_phase(told):
+    """Given, or that of the model's file: both are like a power of one phase."""
+    found = validated(model(rating=3 * RATING, **told), recorded())
+    (one,) = [
+        each
+        for each in found.result.comparisons[0].questions
+        if each.kind is QuestionKind.READ_OTHERWISE
+    ]
+    said = sentence(one)
+    assert said.startswith("P and Q are of one phase?")
+    assert said.endswith("a rating of 450 MVA (S_n) in place of 1350 MVA would tell the same")
+
+
+@pytest.mark.parametrize("names", [["made"], ["made", "other"]])
+def test_the_page_has_a_table_of_errors_for_each_model_of_a_plant(names, monkeypatch):
+    monkeypatch.setattr("orchestrator.studies.validation.page.sha256_of", str)  # there is no file
+    other = replace(model(K=3.0, **TOLD), name="other") if len(names) > 1 else None
+    page = validated(model(**TOLD), recorded(), beside=other).html()
+    of = [f" of {name}" if other else "" for name in names]
+    assert re.findall("<caption>(Errors.*?)</caption>", page) == [
+        f"Errors{each} [pu of the rating]" for each in of
+    ]
