@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import difflib
+import json
+import re
 import tomllib
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
@@ -83,6 +85,19 @@ def with_protection(case: Case, code: NoTripCode | None) -> Case:
 
 def built_in_cases() -> tuple[str, ...]:
     return tuple(sorted(p.parent.name for p in BUILT_IN.glob("*/case.toml")))
+
+
+_FOLDERS = "|".join(
+    map(re.escape, {str(BUILT_IN / "_")[:-1], json.dumps(str(BUILT_IN / "_"))[1:-2]})
+)
+"""The folder of the built-in cases as it stands in a text, and as JSON writes it."""
+
+_INSTALLED = re.compile(rf"(?:{_FOLDERS})(?:(\w+)[\\/]+case\.toml)?")
+
+
+def without_installed_folder(text: str) -> str:
+    """Return a text, or JSON, that calls built-in cases by their names, not by where this installation has them."""
+    return _INSTALLED.sub(lambda found: found[1] or "", text)
 
 
 def as_typed(case: CaseDefinition) -> str:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from fmus.toolchain.cache import cache_directory
-from orchestrator.cases.case import BUILT_IN
+from orchestrator.cases.case import without_installed_folder
 from orchestrator.core.errors import InputError
 
 MOST_WORDS = 20_000
@@ -30,8 +30,6 @@ LARGEST_ANSWER = 64 * 1024**2
 
 _REFUSAL = re.compile(r"^(?:gfor [^\n:]*: )?error: ", re.MULTILINE)
 """The begin of a refusal, after the usage, remarks and questions that a command may have printed."""
-
-_OWN_CASE = re.compile(re.escape(f"{BUILT_IN}{os.sep}") + r"(\w+)[\\/]case\.toml")
 
 _turn = threading.Lock()
 """Questions take turns: each may use all cores, and they write into one folder."""
@@ -108,21 +106,16 @@ def _ask(words: Sequence[str], allowance: Allowance) -> Any:
             f"gfor {' '.join(words)}: the answer has {len(out)} bytes, more than {LARGEST_ANSWER}; ask for less"
         )
     try:
-        return json.loads(_without_own_folder(out.decode()))
+        return json.loads(without_installed_folder(out.decode()))
     except ValueError:
         said = _refusal(err.decode(errors="replace").strip())
         raise NoAnswerError(said or f"gfor {' '.join(words)} printed no JSON") from None
 
 
-def _without_own_folder(text: str) -> str:
-    """Return a text that calls built-in cases by their names, not by where this installation has them."""
-    return _OWN_CASE.sub(r"\1", text).replace(f"{BUILT_IN}{os.sep}", "")
-
-
 def _refusal(said: str) -> str:
     """Return why a command refused, without what it had printed before; the middle of a long text is left out."""
     begin = _REFUSAL.search(said)
-    text = _without_own_folder(said[begin.end() :] if begin else said)
+    text = without_installed_folder(said[begin.end() :] if begin else said)
     if len(text) <= MOST_SAID:
         return text
     half = MOST_SAID // 2

@@ -1,11 +1,10 @@
 """The files of the page: no build step, nothing from elsewhere."""
 
-import json
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from orchestrator.cases.case import BUILT_IN
+from orchestrator.cases.case import without_installed_folder
 from orchestrator.output.report.html.elements import held_data
 
 PAGE = "page.html"
@@ -28,9 +27,6 @@ FILES = {
     **dict.fromkeys(SCRIPTS, "text/javascript; charset=utf-8"),
 }
 
-_FOLDER_OF_CASES = json.dumps(str(BUILT_IN / "_"))[1:-2]
-"""How JSON writes the folder of the built-in cases: a page that is handed on does not tell where they are installed."""
-
 _PLACE = Path(__file__).parent / "page"
 
 
@@ -40,15 +36,17 @@ def content_of(name: str) -> bytes:
 
 
 def whole_page(saved: Any) -> str:
-    """The page as one file that asks no server: ``saved`` is what it shows, as JSON's types."""
+    """The page as one file that asks no server: ``saved`` is what it shows, as JSON's types.
+
+    A page that is handed on does not tell where the built-in cases are installed."""
     text = content_of(PAGE).decode()
     text = text.replace(
         f'<link rel="stylesheet" href="{STYLE}">', f"<style>{content_of(STYLE).decode()}</style>"
     )
     for name in SCRIPTS:
         held = held_data("saved", saved) if name == SCRIPTS[0] else ""
-        held = held.replace(_FOLDER_OF_CASES, "")
         text = text.replace(
-            f'<script src="{name}"></script>', f"{held}<script>{content_of(name).decode()}</script>"
+            f'<script src="{name}"></script>',
+            f"{without_installed_folder(held)}<script>{content_of(name).decode()}</script>",
         )
     return text
