@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -16,12 +17,12 @@ from orchestrator.core.options import Option
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.values import as_text
 from orchestrator.studies.certification.acceptance import Acceptance
-from orchestrator.studies.certification.case_file import BINDING, FMU
+from orchestrator.studies.certification.case_file import BINDING, FMU, WITH
 from orchestrator.studies.certification.codes.row import GridCode
 from orchestrator.studies.certification.damping_controllers import DampingControllers
 from orchestrator.studies.certification.details import Details
 from orchestrator.studies.certification.environment import environment
-from orchestrator.studies.certification.judgement import watched
+from orchestrator.studies.certification.judgement import PointVerdict, watched
 from orchestrator.studies.certification.margins import CriterionMargin
 from orchestrator.studies.certification.point import CONVERTER
 from orchestrator.studies.certification.request import (
@@ -41,6 +42,8 @@ from orchestrator.studies.certification.verdict import (
 
 _FLOW = ("Q_0", "theta_0")
 """Values of the converter that the power flow of the damping test's case gives."""
+
+_INCOMPLETE_AS_WELL = "The test is incomplete as well"
 
 _STUDY = ("S_n", "P_0", "v_0")
 """Values of the converter that the damping test's case sets."""
@@ -119,12 +122,18 @@ class Certificate:
 
     def sentence(self) -> str:
         """The verdict, with what failed or was not tested."""
-        said = self.test_in_words()
-        if self.acceptance is not None and self.refused:
-            said += (
-                f"{REFUSED} {', '.join(self.acceptance.faults)}; do not rely on the FMU as it is."
-            )
-        return said
+        return self.with_refusal(self.test_in_words())
+
+    def earlier_sentences(self) -> Iterator[str]:
+        """Yield the same as earlier versions said it, whose certificates hold."""
+        yield from ()
+
+    def with_refusal(self, said: str) -> str:
+        """Return a sentence on the test with the failed acceptance tests behind it."""
+        if self.acceptance is None or not self.refused:
+            return said
+        faults = ", ".join(self.acceptance.faults)
+        return f"{said}{REFUSED} {faults}; do not rely on the FMU as it is."
 
     @property
     def heading(self) -> str:
@@ -211,14 +220,31 @@ class DampingCertificate(Certificate):
         judged = [v for v in self.verdicts if v.is_judged]
         if self.verdict == FAILS:
             failed = [v for v in judged if not v.accepted]
-            places, first = ", ".join(f"{v.X_L:g}" for v in failed), failed[0]
-            text = f"{subject} fails the damping test at X_L = {places} pu. At {first.X_L:g} pu: "
-            text += f"{'; '.join(first.faults)}."
-            return f"{text} The test is incomplete as well: {reasons}." if reasons else text
+            worst = min(failed, key=self._standing)
+            at = f"X_L = {worst.X_L:g} pu: {'; '.join(worst.faults)}."
+            several = f"{len(failed)} of {len(judged)} line reactances, worst at "
+            text = f"{subject} fails the damping test at {several * (len(failed) > 1)}{at}"
+            return f"{text} {_INCOMPLETE_AS_WELL}: {reasons}." if reasons else text
         where = "is accepted where it was judged" if judged else "was judged nowhere"
         unknown = [v for v in self.verdicts if not v.is_judged]
         text = f"The damping test is incomplete: {reasons}. {subject} {where}"
         return f"{text}; at {unknown[0].X_L:g} pu, {unknown[0].unknown}." if unknown else f"{text}."
+
+    def earlier_sentences(self) -> Iterator[str]:
+        failed = [v for v in self.verdicts if v.is_judged and not v.accepted]
+        if self.verdict != FAILS:
+            return
+        places, first = ", ".join(f"{v.X_L:g}" for v in failed), failed[0]
+        text = f"The converter {self.description.model_name!r} {self.controllers.in_words()} fails the damping test "
+        text += f"at X_L = {places} pu. At {first.X_L:g} pu: {'; '.join(first.faults)}."
+        reasons = incomplete_because(missing_of(self), self.departures)
+        yield self.with_refusal(f"{text} {_INCOMPLETE_AS_WELL}: {reasons}." if reasons else text)
+
+    def _standing(self, point: PointVerdict) -> tuple[float, float]:
+        """The least margin of what a point is not accepted for, -∞ where that has no figure, and its growth turned."""
+        margins = [one.margin for one in point.margins() if not one.accepted]
+        least = min((-math.inf if one is None else one for one in margins), default=-math.inf)
+        return least, -self.results[WITH, point.X_L].growth
 
 
 def missing_of(c: Certificate) -> tuple[float, ...]:

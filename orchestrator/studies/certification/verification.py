@@ -120,7 +120,10 @@ def _judged_again(
         with xr.open_dataset(folder / RESPONSES, engine="scipy") as data:
             seen = look_at_page(folder, content, data) if (folder / HTML).is_file() else PageSeen()
             views += [seen.unproved] if seen.unproved else []
-            again = json.loads(json.dumps(figures_of(rebuilt(folder, content, data))))
+            certificate = rebuilt(folder, content, data)
+            again = json.loads(json.dumps(figures_of(certificate)))
+            if content["sentence"] in certificate.earlier_sentences():
+                again["sentence"] = content["sentence"]
             if not of_one_program(content, again):
                 said.append(
                     "figures and verdicts alone: another commit issued it, so title, source, readings and the "

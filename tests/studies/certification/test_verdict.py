@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from html import escape
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from orchestrator.studies.certification import study as study_module
 from orchestrator.studies.certification.point import FREQUENCY, POWER, PointResult
 from orchestrator.studies.certification.request import REACTANCES
 from tests.studies.certification.fabricated import EVERY, TIMES, figures, rings
+from tests.studies.certification.test_issued import forged
 
 
 @pytest.fixture
@@ -167,7 +169,39 @@ def test_a_response_that_the_watch_did_not_judge_is_not_passed(certified):
 def test_failing_beyond_the_norms_reactances_is_failing(certified):
     code, _, content, _ = certified("--reactances", "0.1,0.7", points=only(0.7, **UNSTABLE))
     assert code == 1
-    assert "fails the damping test at X_L = 0.7 pu" in content["sentence"]
+    assert "fails the damping test at X_L = 0.7 pu: " in content["sentence"]
+
+
+@pytest.mark.parametrize(("word", "code"), [("fails", 1), ("passes", 5)])
+def test_the_sentence_of_earlier_versions_holds(certified, gfor, tmp_path, word, code):
+    """It listed all reactances; another word in it is seen."""
+    *_, page = certified("--reactances", "0.1,0.3", points=only(0.3, **UNSTABLE))
+    content = json.loads((tmp_path / "certificate.json").read_text(encoding="utf-8"))
+    now = content["sentence"]
+    before = now.replace("X_L = 0.3 pu: ", "X_L = 0.3 pu. At 0.3 pu: ").replace("fails", word)
+    shown = page.replace("\N{NO-BREAK SPACE}", " ").replace(escape(now), escape(before))
+    (tmp_path / "certificate.html").write_text(shown, encoding="utf-8")
+    forged(tmp_path, content | {"sentence": before})
+    found, text, _ = gfor("verify", tmp_path, "--json", "--files-only")
+    assert before != now
+    assert found == code, json.loads(text)["faults"]
+
+
+@pytest.mark.parametrize(("rates", "worst"), [((0.0, 104.6, 12.0), 0.3), ((0.0, 12.0, 104.6), 0.5)])
+def test_the_headline_has_the_worst_reactance_and_how_many_there_are(certified, rates, worst):
+    """The sentence once listed all of them, and the faults of the first."""
+    growing = dict(zip((0.1, 0.3, 0.5), rates, strict=True))
+
+    def compute(task):
+        found = rings(task)
+        return replace(found, growth=growing[task.X_L]) if task.scenario == "with" else found
+
+    code, text, content, page = certified("--reactances", "0.1,0.3,0.5", points=compute)
+    assert code == 1
+    said = f"fails the damping test at 2 of 3 line reactances, worst at X_L = {worst} pu: "
+    assert said in " ".join(text.split())
+    assert said in content["sentence"]
+    assert said in page.replace("\N{NO-BREAK SPACE}", " ")
 
 
 @pytest.mark.parametrize("place", [0, 125, 499])
@@ -279,7 +313,7 @@ def test_what_the_watch_saw_of_an_unstable_run_fails_the_point(certified, kind, 
     finding = Finding(kind, 3.0, "converter", "omega", "the converter does it").as_json()
     code, _, content, _ = certified("--reactances", "0.1,0.3", points=only(0.3, findings=[finding]))
     assert code == (1 if fails else 3)
-    assert ("At 0.3 pu: the converter does it." in content["sentence"]) == fails
+    assert ("X_L = 0.3 pu: the converter does it." in content["sentence"]) == fails
     assert content["points"][1]["findings"] == {"without": [], "with": [finding]}
 
 
