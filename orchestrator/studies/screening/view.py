@@ -498,7 +498,12 @@ def as_json(summary: Summary) -> dict[str, Any]:
     result = summary.result
     free = [_where(item) | {"zero_eigenvalues": item.record.zeros} for item in summary.free]
     failures = [
-        _where(item) | {"status": str(item.record.status), "why": item.record.text}
+        _where(item)
+        | {
+            "status": str(item.record.status),
+            "why": item.record.text,
+            "cause": item.record.cause or item.record.text,
+        }
         for item in summary.failures()
     ]
     return {
