@@ -63,8 +63,10 @@ _OF_MODE = (
 
 _LEAST_SHARE = 0.005
 _CELL = 96  # side of a square of the matrix [px]
-_MARGIN = 120  # space for the names above and left of it [px]
-_LONGEST = 13  # characters that fit above a square, and left of it
+_NAME = 12  # size of the names' type [px]
+_CAPITAL = 8.6  # width of a capital letter in it [px]
+_GAP = 8  # between a name and a square, or another name [px]
+_LONGEST = 21  # characters of a name: above the matrix it has two squares' width, where neighbours stand in turns
 
 _GOOD, _MIDDLE, _BAD, _UNKNOWN = (86, 180, 233), (255, 255, 255), (213, 94, 0), "#d9d9d9"
 _FULL = 20.0  # damping [%] with the full colour of good ones; −20 % has that of bad ones
@@ -506,12 +508,18 @@ def _swap(judgement: JudgedInteractions, figures: Figures) -> str:
 
 def _heat_picture(name: str, labels: Sequence[str], cells: Sequence[Sequence[JudgedSystem]]) -> str:
     """A square for each system, coloured by its least damping; the figure, and U where it is unstable, stand in it."""
-    parts = [_text(_MARGIN + (k + 0.5) * _CELL, 20, label) for k, label in enumerate(labels)]
+    longest = _CAPITAL * min(_LONGEST, max(map(len, labels)))  # [px]
+    lines = 1 if longest + _GAP <= _CELL else 2
+    left, top = longest + 2 * _GAP, lines * (_NAME + _GAP) + _GAP
+    parts = []
+    for k, label in enumerate(labels):
+        above = top - _GAP - k % lines * (_NAME + _GAP)
+        parts.append(_name(left + (k + 0.5) * _CELL, above, label))
     for i, label in enumerate(labels):
-        middle = 30 + (i + 0.5) * _CELL
-        parts.append(_text(_MARGIN - 8, middle + 4, label, "end"))
+        middle = top + (i + 0.5) * _CELL
+        parts.append(_name(left - _GAP, middle + 4, label, "end"))
         for k, system in enumerate(cells[i]):
-            x, y = _MARGIN + k * _CELL, 30 + i * _CELL
+            x, y = round(left) + k * _CELL, top + i * _CELL
             told = f"{label}, {labels[k]}: {verdict_word(system)}, {damping_text(system)} %"
             parts.append(
                 f'<rect x="{x + 1}" y="{y + 1}" width="{_CELL - 2}" height="{_CELL - 2}" fill="{_colour(system)}" '
@@ -520,18 +528,25 @@ def _heat_picture(name: str, labels: Sequence[str], cells: Sequence[Sequence[Jud
             sign = {True: "", False: "U", None: "?"}[system.stable]
             parts.append(_text(x + _CELL / 2, y + _CELL / 2, damping_text(system)))
             parts.append(_text(x + _CELL / 2, y + _CELL / 2 + 18, sign))
-    width, height = _MARGIN + len(labels) * _CELL + 8, 38 + len(labels) * _CELL
+    width, height = (round(x + len(labels) * _CELL + _GAP) for x in (left, top))
     return (
         f'<svg viewBox="0 0 {width} {height}" style="max-width:{width}px" role="img" aria-label="{escape(name)}">'
         f"{''.join(parts)}</svg>"
     )
 
 
-def _text(x: float, y: float, text: str, anchor: str = "middle") -> str:
-    """A text; a long one is shortened, and whole under the pointer."""
-    shown = text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
-    told = "" if shown == text else f"<title>{escape(text)}</title>"
-    return f'<text x="{x:.0f}" y="{y:.0f}" text-anchor="{anchor}" fill="#000">{escape(shown)}{told}</text>'
+def _name(x: float, y: float, name: str, anchor: str = "middle") -> str:
+    """A name in small type; a long one is shortened, and whole under the pointer."""
+    shown = name if len(name) <= _LONGEST else f"{name[: _LONGEST - 1]}…"
+    told = "" if shown == name else f"<title>{escape(name)}</title>"
+    return (
+        f'<text x="{x:.0f}" y="{y:.0f}" font-size="{_NAME}" text-anchor="{anchor}" fill="#000">{escape(shown)}'
+        f"{told}</text>"
+    )
+
+
+def _text(x: float, y: float, text: str) -> str:
+    return f'<text x="{x:.0f}" y="{y:.0f}" text-anchor="middle" fill="#000">{escape(text)}</text>'
 
 
 def _colour(system: JudgedSystem) -> str:
