@@ -87,7 +87,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser,
         "--out",
         "FILE.toml",
-        "parameter file (default: <case>_<controller>.toml, here)",
+        "parameter file, or a folder for it (default: <case>_<controller>.toml, here)",
         read=Path,
     )
     over_points = parser.add_argument_group("over operating points")
@@ -98,18 +98,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     if options.points is not None:
         _check_over_points(options)
-        out = options.out and _writable(options.out)
-        return run_over_points(
-            options,
-            out
-            or Path(
-                f"{case_of(options).name}_{'_'.join(dict.fromkeys(options.controller))}_points.toml"
-            ),
-        )
+        controllers = "_".join(dict.fromkeys(options.controller))
+        usual = f"{case_of(options).name}_{controllers}_points.toml"
+        return run_over_points(options, _writable(options.out, usual))
     _check_for_one_point(options)
     case = case_of(options)
     request = _request(options)
-    path = _writable(options.out or Path(f"{case.name}_{request.controller}.toml"))
+    path = _writable(options.out, f"{case.name}_{request.controller}.toml")
     folder = path.with_suffix(".points")
     with saying_how_it_goes_on(lambda: _how_it_goes_on(folder)):
         try:
@@ -244,9 +239,11 @@ def _request(options: argparse.Namespace) -> DesignRequest:
     return DesignRequest(**asked_of_case(options, DesignRequest, "design") | first | how)
 
 
-def _writable(out: Path) -> Path:
-    """The parameter file's path, tried before anything is computed."""
-    path = parameter_file_path(out, "--out")
+def _writable(out: Path | None, usual: str) -> Path:
+    """The parameter file's path, tried before anything is computed; of its ``usual`` name in a folder."""
+    folder = Path() if out is None else out
+    in_folder = folder.is_dir() or not folder.suffix
+    path = folder / usual if in_folder else parameter_file_path(folder, "--out")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         existed = path.exists()

@@ -35,12 +35,14 @@ _STUDIES: tuple[tuple[set[str], Callable[[Path, Any], Chapter]], ...] = (
 
 def chapters_of(place: Path) -> list[Chapter]:
     """Return the chapters of a study's folder or of its JSON; files of others in the folder are passed over."""
-    return [chapter for file in _files(place) for chapter in _chapters(file, file == place)]
+    named = place.is_file()
+    return [chapter for file in _files(place) for chapter in _chapters(file, named)]
 
 
 def _files(place: Path) -> list[Path]:
     if place.is_file():
-        return [place]
+        beside = place.with_suffix(".json")  # of a parameter file, whose design stands beside it
+        return [beside if beside.is_file() else place]
     files = sorted(place.glob("*.json"))
     if (place / "sweep.nc").is_file():
         files = [file for file in files if file.name != "limits.json"]  # `of_sweep` tells of it
