@@ -20,12 +20,15 @@ from orchestrator.face.explore.interpolation import cells_of, corners_of, judged
 from orchestrator.face.explore.movers import grid_of
 from orchestrator.face.explore.smaller import rounded, smaller_answer, smaller_parameters
 from orchestrator.face.explore.worker import Desk
+from orchestrator.output.report.short_texts import first_sentence, short
+from orchestrator.studies.points.failure import Failure
 from orchestrator.studies.points.points import CountReport
 from orchestrator.studies.sweep.axes import Axis, Vary, resolve
 
 _MOST = 400  # of the grid's points: the page holds all their modes
 _STEPS = 12  # values of a slider of the first screen, beside the case's own
 _HALVES = 5  # of the way to a slider's end that has no answer: its last value is within 3 % of it
+_LONGEST_REASON = 120  # characters of why a slider goes no further
 _BYTES = 2_500_000  # that the answers of such a page take, about
 
 
@@ -86,6 +89,7 @@ class _Plan:
     grid: Mapping[str, Sequence[float]]  # values of each slider
     own: Mapping[str, float]  # the case's value of each
     first: Mapping[str, Any]  # what the first screen has beside the modes
+    ends: Mapping[str, Mapping[str, str]]  # why a slider goes no further ``below`` or ``above``
     points: Sequence[Mapping[str, float]]
     cells: Sequence[Mapping[str, tuple[float, float]]]
     alone: bool  # each slider moves alone, from the case's values
@@ -120,13 +124,16 @@ def _plan_of(
         return desk.answer({**asked, "ask": "modes", "values": given}, _nobody)
 
     first: dict[str, Any] = {}
+    ends: dict[str, dict[str, str]] = {}
     if varied:
         first["first"] = _answered(desk, {**asked, "values": values, "ask": "first"})
     else:
         first, steps = _first_screen(desk, {**asked, "values": values})
         movers = first["movers"]["movers"]
         own = {one["parameter"]: one["value"] for one in movers}
-        grid = {one["parameter"]: _reached_values(one, steps, computed) for one in movers}
+        reached = {one["parameter"]: _reached_values(one, steps, computed) for one in movers}
+        grid = {key: values for key, (values, _) in reached.items()}
+        ends = {key: why for key, (_, why) in reached.items() if why}
         points += [{key: x} for key, axis in grid.items() for x in axis if x != own[key]]
     listed = {one["parameter"] for one in parameters.get("parameters", ())}
     added = [_as_parameter(axis, grid[axis.key], own) for axis in axes if axis.key not in listed]
@@ -140,6 +147,7 @@ def _plan_of(
         grid=grid,
         own=own,
         first=first,
+        ends=ends,
         points=points,
         cells=cells,
         alone=not varied,
@@ -151,7 +159,8 @@ def _shown_of(plan: _Plan, answers: Sequence[Mapping[str, Any]]) -> dict[str, An
     """Return what the page has for each scenario: its sliders' values, the case's own, and the first screen."""
     own = [one for one in answers if one["scenario"] == plan.name]
     grid = _values_with_answers(plan.grid, plan.own, own) if plan.alone else plan.grid
-    return {"grid": grid, "own": plan.own, **rounded(plan.first)}
+    ends = {"ends": plan.ends} if plan.ends else {}
+    return {"grid": grid, "own": plan.own, **ends, **rounded(plan.first)}
 
 
 class _Held:
@@ -257,14 +266,20 @@ def _answered(desk: Desk, question: Mapping[str, Any]) -> dict[str, Any]:
 
 def _reached_values(
     mover: Mapping[str, Any], steps: int, computed: Callable[[Mapping[str, float]], dict[str, Any]]
-) -> list[float]:
-    """A slider's values, all of them in the range where the case has an answer: few beside it would hide a mode."""
+) -> tuple[list[float], dict[str, str]]:
+    """A slider's values, all of them in the range where the case has an answer: few beside it would hide a mode.
+
+    Beside them, why it goes no further ``below`` or ``above``, where that is a declared bound or has no answer."""
     key, value = str(mover["parameter"]), float(mover["value"])
+    why: dict[str, str] = {}
 
     def answered(x: float) -> bool:
         try:
             computed({key: x})
-        except CosimError:
+        except CosimError as error:
+            failure = Failure.of(error)
+            said = first_sentence(str(failure.cause or failure.text)).removesuffix(".")
+            why["below" if x < value else "above"] = short(said, _LONGEST_REASON)
             return False
         return True
 
@@ -274,7 +289,11 @@ def _reached_values(
         return halve_towards(value, end, answered, most=_HALVES, rounded=_in_four_digits)[0]
 
     axis = grid_of(mover, steps)
-    return grid_of({**mover, "minimum": farthest(axis[0]), "maximum": farthest(axis[-1])}, steps)
+    low, high = farthest(axis[0]), farthest(axis[-1])
+    for side, end, bound in (("below", low, "minimum"), ("above", high, "maximum")):
+        if end == mover[bound]:
+            why[side] = "the declared bound"
+    return grid_of({**mover, "minimum": low, "maximum": high}, steps), why
 
 
 def _in_four_digits(x: float) -> float:

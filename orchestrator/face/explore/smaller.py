@@ -12,7 +12,17 @@ _STATES = 7  # of a mode's participation; the page has bars for eight at most
 _COMPONENTS = 6  # of a mode's participation
 _SEEN = 0.02  # an arrow shorter than this part of the longest is not drawn
 _OF_SCENARIO = ("name", "stable", "warnings", "power_flow", "modes")
-_OF_ANSWER = ("title", "verdict", "outside", "warnings", "idle", "swings", "copied", "stamp")
+_OF_ANSWER = (
+    "title",
+    "verdict",
+    "outside",
+    "rated_hz",
+    "warnings",
+    "idle",
+    "swings",
+    "copied",
+    "stamp",
+)
 _UNDRAWN = "areas"  # of a mode: the page draws participations by component and by state
 _LISTED = 1000  # parameters up to which a page lists all of them
 

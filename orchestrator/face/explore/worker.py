@@ -281,6 +281,7 @@ class Desk:
             "title": scenario.title,
             "verdict": modes.stability.sentence(),
             "outside": None if hidden is None else hidden.sentence(remedy=False),
+            "rated_hz": hidden and hidden.rated_hz,
             "warnings": [*_questions(scenario), *modes.result.unasked],
             "idle": idle,
             "swings": [

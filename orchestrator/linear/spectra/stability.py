@@ -53,6 +53,9 @@ _DENSE_VECTORS = 200
 _STATES_NAMED = 3
 _STATES_KEPT = 6  # in JSON, those that take part most
 _SWINGS_SHOWN = 3
+_NEAR_RATED = 0.02
+"""Part of the rated frequency by which a mode may be off it and be of direct currents: in the network's frame, which
+turns with that frequency, they swing with it."""
 
 
 class Cause(StrEnum):
@@ -63,13 +66,14 @@ class Cause(StrEnum):
 
 @dataclass(frozen=True)
 class Hidden:
-    """Oscillatory modes outside of a frequency range [Hz]: how many, the least damped of them, and those of which it is
-    known that generators swing in them [rad/s]."""
+    """Oscillatory modes outside of a frequency range [Hz]: how many, the least damped of them, those of which it is
+    known that generators swing in them [rad/s], and the rated frequency of the network [Hz], None where not known."""
 
     frequency_range: tuple[float, float]
     count: int
     least_damped: complex | None
     electromechanical: tuple[complex, ...] = ()
+    rated_hz: float | None = None
 
     def sentence(self, *, remedy: bool = True) -> str:
         low, high = self.frequency_range
@@ -78,6 +82,8 @@ class Hidden:
         if self.least_damped is None:
             return text
         text += f"; the least damped of them: {self._hertz:.4g} Hz, {self._percent:.2f} %"
+        if self._is_of_direct_currents:
+            text += ", near the rated frequency, where direct currents of the network die away: no swing of machines"
         if not self.electromechanical:
             return text
         shown = [
@@ -115,6 +121,15 @@ class Hidden:
             "least_damped": least,
             "electromechanical": swings,
         }
+
+    @property
+    def _is_of_direct_currents(self) -> bool:
+        """Return whether the least damped mode is one of the network at its rated frequency."""
+        if self.rated_hz is None or self.least_damped in self.electromechanical:
+            return False
+        return (
+            self._percent >= 0 and abs(self._hertz - self.rated_hz) <= _NEAR_RATED * self.rated_hz
+        )
 
     @property
     def _lowest_swing(self) -> float:

@@ -17,7 +17,7 @@ from orchestrator.cases.events.fault_tables import component_faults
 from orchestrator.cases.form.schema import ReferenceModeTable
 from orchestrator.cases.networks.areas import areas_of
 from orchestrator.cases.questions.dead_bands import resting_loops
-from orchestrator.cases.scenario.facts import facts_of
+from orchestrator.cases.scenario.facts import facts_of, rated_frequency
 from orchestrator.cases.scenario.flow_figures import power_flow_json
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.scenario.service import in_service
@@ -457,7 +457,9 @@ class Linearised:
             beyond = [mode for mode in oscillating if not low <= mode.frequency_hz <= high]
             swings = [mode.eigenvalue for mode in beyond if is_swing(mode, analysis.swing)]
             outside = replace(
-                hidden(spectrum.eigenvalues, low, high), electromechanical=tuple(swings)
+                hidden(spectrum.eigenvalues, low, high),
+                electromechanical=tuple(swings),
+                rated_hz=rated_frequency(prepared),
             )
         fit_errors = {
             name: component.disagreement

@@ -209,6 +209,20 @@ def test_a_double_zero_that_the_perturbation_splits_is_no_growth():
     )
 
 
+@pytest.mark.parametrize(
+    ("hertz", "rated", "is_said"),
+    [(60.03, 60.0, True), (50.37, 50.0, True), (60.0, 50.0, False), (60.0, None, False)],
+)
+def test_what_swings_with_the_rated_frequency_is_called_no_swing_of_machines(hertz, rated, is_said):
+    """Pages said "60 Hz, 0.00 %" in their first lines as if it were one."""
+    mode = complex(-0.01, 2 * np.pi * hertz)
+    said = Hidden((0.1, 2.0), 7, mode, rated_hz=rated).sentence()
+    assert f"the least damped of them: {hertz:g} Hz, 0.00 %" in said
+    assert ("direct currents of the network die away: no swing of machines" in said) == is_said
+    swings = Hidden((0.1, 2.0), 7, mode, (mode,), rated_hz=rated)
+    assert "direct currents" not in swings.sentence()
+
+
 def test_electromechanical_modes_outside_of_the_range_are_named_with_a_range_that_shows_them():
     swings = (complex(-1.6, 2 * np.pi * 2.098), complex(-0.2, 2 * np.pi * 0.052))
     found = Hidden((0.1, 2.0), 7, complex(-1.0, 500.0), swings)

@@ -47,6 +47,12 @@ function paintControls() {
   paintMovers(true);
   if (focused) document.querySelector(`.control[data-name="${CSS.escape(focused)}"] input[type="${kind === "range" ? "range" : kind === "text" ? "text" : "checkbox"}"]`)?.focus({ preventScroll: true });
 }
+// Why a saved page's slider goes no further, where that is a bound or nothing could be computed beyond.
+function wordsOfEnds(name, held) {
+  const { below, above } = SAVED.ends?.[name] ?? {}, [low, high] = [number(held[0]), number(held.at(-1))];
+  if (below && below === above) return `beyond ${low} and ${high}: ${below}`;
+  return [below && `below ${low}: ${below}`, above && `above ${high}: ${above}`].filter(Boolean).join("; ");
+}
 // A value's slider or switch; `mover` tells what it does to the mode, where it is one of those that move it most.
 function controlOf(name, mover = null) {
   const p = parameterOf(name);
@@ -91,6 +97,8 @@ function controlOf(name, mover = null) {
   }
   const held = SAVED?.grid[name];
   const bounds = held ? `, computed from ${number(held[0])} to ${number(held.at(-1))}` : p && (p.minimum !== null || p.maximum !== null) ? `, from ${p.minimum === null ? "any" : number(p.minimum)} to ${p.maximum === null ? "any" : number(p.maximum)}` : "";
+  const ends = held ? wordsOfEnds(name, held) : "";
+  if (ends) box.append(make("small", { class: "block" }, ends));
   if (mover) box.append(make("small", { class: "short", title: p?.description }, p?.description ?? ""));
   box.append(make("small", { hidden: mover ? "" : null }, p ? `${p.description}${p.description ? "; " : ""}${p.variability}${bounds}; ${number(original(name))} in the case` : "this scenario has no such parameter"), error);
   for (const off of (p?.switches ?? []).filter(one => (state.values[one] ?? original(one)) === false)) {
