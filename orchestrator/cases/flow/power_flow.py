@@ -290,14 +290,14 @@ def _helps(equations: FlowEquations, with_stray: Callable[[float], FlowEquations
         for part in _SHARES:
             if solve(with_stray(part)).converged:
                 return (
-                    f"It has a solution with {part:.0%} of stray_B: stray capacitances raise the voltage behind large "
-                    "reactances; lower stray_B. "
+                    f"It has a solution with {100 * part:.0f} % of stray_B: stray capacitances raise the voltage "
+                    "behind large reactances; lower stray_B. "
                 )
     if found is not None:
         return (
-            f"With all loads and all units' power at {min(share, 0.99):.0%} it has a solution: the lines cannot carry "
-            f"the power asked of them. {'Is a power in kW? ' * (share < _LITTLE)}Lower P_0 or the loads, or the line "
-            "reactances. "
+            f"With all loads and all units' power at {100 * min(share, 0.99):.0f} % it has a solution: the lines "
+            f"cannot carry the power asked of them. {'Is a power in kW? ' * (share < _LITTLE)}"
+            "Lower P_0 or the loads, or the line reactances. "
         )
     return (
         "There is none without load and generation either: check line charging, shunts and reactances, which raise "

@@ -418,7 +418,7 @@ def _growth_elsewhere(one: Mapping[str, Any]) -> str:
 
 def _sentence(mode: Mapping[str, Any]) -> str:
     parts = list(_largest(mode["components"]).items())[:4]
-    who = ", ".join(f"{name} {share:.0%}" for name, share in parts)
+    who = ", ".join(f"{name} {100 * share:.0f} %" for name, share in parts)
     return (
         f"the mode of {mode['frequency_hz']:.3f} Hz has a damping of {mode['damping_percent']:.2f} %; "
         f"in it take part {who}"

@@ -135,5 +135,6 @@ def swing_test(
             dropped, swings, None, False, "the record ends before the fifth swing; make it longer"
         )
     count = {0: "no swing", 1: "one swing"}.get(len(swings), f"{len(swings)} swings")
-    reason = f"died out after {count}: from {quiet:.1f} s on no turn above {RESOLUTION:.1%} of the signal's range"
+    least = f"{100 * RESOLUTION:.1f} % of the signal's range"
+    reason = f"died out after {count}: from {quiet:.1f} s on no turn above {least}"
     return SwingTest(dropped, swings, 0.0, True, reason)

@@ -81,5 +81,5 @@ def _followed(result: ModesResult, other: ModesResult, before: Mode) -> float:
         )
     except continuation.ModesMeetError as error:
         raise AnalysisError(
-            f"the mode meets another one at {error.beyond:.0%} of the controllers' gains"
+            f"the mode meets another one at {100 * error.beyond:.0f} % of the controllers' gains"
         ) from error

@@ -108,7 +108,7 @@ def _settle(name: str, system: NamedSystem, origin: _Origin, near: continuation.
             origin.start, way.model_at, 0.0, 1.0, way.strides, way.common, near=near
         ).eigenvalue
     except continuation.ModesMeetError as error:
-        where = f"meets another one {error.beyond:.0%} of the way from there, at {_figures(error.eigenvalue)}"
+        where = f"meets another one {100 * error.beyond:.0f} % of the way from there, at {_figures(error.eigenvalue)}"
         return _without(
             naming, name, f"{was} {where}, and cannot be told from it beyond", sure=sure
         )

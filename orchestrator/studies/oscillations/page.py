@@ -123,7 +123,7 @@ def _map(measured: Measurements, one: Located, others: list[float], figures: Fig
         )
     branches = [(place.bus, place.beyond) for place in measured.places if place.beyond]
     texts = {
-        bus: f"{bus}: {'feeds' if part > 0 else 'takes'} {abs(part):.0%}"
+        bus: f"{bus}: {'feeds' if part > 0 else 'takes'} {100 * abs(part):.0f} %"
         for bus, part in fed.items()
     }
     seen = max(fed.values(), default=0.0) > _RED

@@ -291,5 +291,5 @@ def _who(mode: Mode, speeds: Sequence[str]) -> str:
     if mode.participation_of(states) >= 0.1 and said:
         return said
     return ", ".join(
-        f"{name} {share:.0%}" for name, share in list(mode.by_component.items())[:_PARTS]
+        f"{name} {100 * share:.0f} %" for name, share in list(mode.by_component.items())[:_PARTS]
     )

@@ -86,8 +86,8 @@ def _angle_unit(x: Figures) -> str:
 
 def _angle_held(x: Figures) -> str:
     return (
-        f"{x['part']:.0%} of the angle's samples are that of the sample before: the recorder holds it, and the device "
-        "sees steps that the plant did not. Give a recording with its own samples"
+        f"{100 * x['part']:.0f} % of the angle's samples are that of the sample before: the recorder holds it, and the "
+        "device sees steps that the plant did not. Give a recording with its own samples"
     )
 
 

@@ -299,7 +299,7 @@ def lasting_sentence(errors: Sequence[LastingError], *, explained: bool) -> str:
     if not errors:
         return ""
     worst, more = errors[0], len(errors) - 1
-    part = "" if worst.part is None else f", {worst.part:.0%} of its swing (rms)"
+    part = "" if worst.part is None else f", {100 * worst.part:.0f} % of its swing (rms)"
     others = f", and {number_of(more, 'signal')} more" if more else ""
     hint = "" if explained else f": type {Option.EXPLAIN}, which looks for the cause"
     return (
@@ -329,8 +329,8 @@ def yardstick_sentence(comparisons: Sequence[EventComparison]) -> str:
 
 
 def _off(swing: PlantSwing) -> str:
-    part, rms_part = swing.part or 0.0, swing.rms_part or 0.0
-    return f"up to {part:.0%} of the {swing.largest:.3g} pu that the plant swings ({rms_part:.0%} in the mean)"
+    part, mean = 100 * (swing.part or 0.0), 100 * (swing.rms_part or 0.0)
+    return f"up to {part:.0f} % of the {swing.largest:.3g} pu that the plant swings ({mean:.0f} % in the mean)"
 
 
 def rating_words(device: PlayedDevice) -> str:
@@ -455,7 +455,7 @@ def explanation_cells(one: Explanation) -> tuple[str, ...]:
         value_text(one.now),
         f"{value_text(one.value)}{beside}",
         f"{one.left:.4g} of {one.error:.4g}",
-        f"{one.share:.0%}",
+        f"{100 * one.share:.0f} %",
         _likely(one),
     )
 
@@ -539,26 +539,19 @@ def _said_of_causes(explanations: Sequence[Explanation], *, finished: bool, in_s
     if not explanations:
         return "No cause that was tried leaves less of the error."
     best = explanations[0]
+    part = f"{100 * best.share:.0f} % of the squared error beyond the recording's own noise"
     if best.cause in (CauseKind.LAG, CauseKind.CLOCK):
-        return (
-            f"The likeliest cause is {_cause(best)}: it explains {best.share:.0%} of the squared error beyond the "
-            "recording's own noise, and no parameter was tried beside it."
-        )
+        return f"The likeliest cause is {_cause(best)}: it explains {part}, and no parameter was tried beside it."
     if best.stands_in:
         return (
             "No cause is named: the model's current is above a limit that it lacks, as the note says, and values only "
-            f"stand in for that limit. The nearest is {_cause(best)}, with {best.share:.0%} of the squared error "
-            "beyond the recording's own noise. Give the EMT model, or a recording of a smaller event."
+            f"stand in for that limit. The nearest is {_cause(best)}, with {part}. Give the EMT model, or a recording "
+            "of a smaller event."
         )
     if not best.explains:
-        return (
-            f"No cause by itself explains most of the error; the nearest is {_cause(best)}, with {best.share:.0%} of "
-            "the squared error beyond the recording's own noise."
-        )
+        return f"No cause by itself explains most of the error; the nearest is {_cause(best)}, with {part}."
     are, they = ("causes are", "they explain") if best.beside_now else ("cause is", "it explains")
-    said = f"The likeliest {are} {_cause(best)}: "
-    said += f"{they} {best.share:.0%} of the squared error beyond the recording's own noise"
-    said += f"{_first_alone(explanations)}."
+    said = f"The likeliest {are} {_cause(best)}: {they} {part}{_first_alone(explanations)}."
     alike = [one for one in explanations[1:] if one.name != best.name and one.explains]
     if not in_step:  # what gives way leaves something of the right value as well
         said += _left_over(best, finished=finished)
@@ -573,7 +566,7 @@ def _first_alone(explanations: Sequence[Explanation]) -> str:
     alone = next((one for one in others if one.name == best.name and one.takes_second), None)
     if not best.beside_now or alone is None:
         return ""
-    return f", {best.name} by itself {alone.share:.1%} and leaves {alone.left:.2g} pu (rms)"
+    return f", {best.name} by itself {100 * alone.share:.1f} % and leaves {alone.left:.2g} pu (rms)"
 
 
 def _left_over(best: Explanation, *, finished: bool) -> str:

@@ -198,7 +198,9 @@ def test_stray_capacitance_behind_a_large_reactance_is_named():
         )
 
     assert abs(flow(0.0).voltages["b"]) < 1
-    with pytest.raises(InputError, match=r"It has a solution with 75% of stray_B: .*lower stray_B"):
+    with pytest.raises(
+        InputError, match=r"It has a solution with 75 % of stray_B: .*lower stray_B"
+    ):
         flow(0.5)
 
 

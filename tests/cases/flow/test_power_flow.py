@@ -147,12 +147,12 @@ def test_more_than_a_line_can_carry():
     assert text.startswith("power flow: no solution found. The iterations end with ")
     assert "at bus 'b' (largest mismatch by iteration: " in text
     assert (
-        "With all loads and all units' power at 99% it has a solution: the lines cannot carry the power"
+        "With all loads and all units' power at 99 % it has a solution: the lines cannot carry the power"
         in text
     )
     assert "Lower P_0 or the loads, or the line reactances" in text
     assert text.endswith("deg), X = 0.2 pu, which would carry 252 MW")
-    for times, share in ((1.0005, "99%"), (4000, "0%")):
+    for times, share in ((1.0005, "99 %"), (4000, "0 %")):
         with pytest.raises(InputError, match=f"power at {share} it has a solution"):
             solve(times * 100 / (2 * X))
     with pytest.raises(InputError, match="Is a power in kW"):

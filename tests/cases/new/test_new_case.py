@@ -179,7 +179,7 @@ def test_a_mode_is_followed_along_the_gains_to_what_the_device_brings(files, mon
         f"POD-P at least {least:+.2f} points (least damped: {weakest.damping_percent:.2f} %)"
         in sentence
     )
-    assert sentence.endswith("as the mode meets another one at 70% of the controllers' gains")
+    assert sentence.endswith("as the mode meets another one at 70 % of the controllers' gains")
 
 
 def test_what_the_device_brings_is_told_apart_from_the_dispatch(files):

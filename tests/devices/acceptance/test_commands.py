@@ -169,7 +169,12 @@ def test_what_cannot_be_used(arguments, words, gfor, gallery):
     [
         ("held", "1e-4", "fail", "every 1 ms only"),
         ("held", "1e-3", "pass", "every 1 ms only; with steps of 1 ms that is every step"),
-        ("van_der_pol", "0.007", "remark", "every 10 ms only: 30% of all steps of 7 ms do nothing"),
+        (
+            "van_der_pol",
+            "0.007",
+            "remark",
+            "every 10 ms only: 30 % of all steps of 7 ms do nothing",
+        ),
     ],
 )
 def test_a_check_at_the_step_of_use(fmu, step, verdict, words, gfor, gallery):

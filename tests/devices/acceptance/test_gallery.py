@@ -136,7 +136,7 @@ def test_a_sum_of_times_in_single_precision_shows_after_a_rest(gallery):
         (
             "held",
             "sample_time",
-            "its outputs change every 1 ms only: 90% of all steps of 100 µs do nothing",
+            "its outputs change every 1 ms only: 90 % of all steps of 100 µs do nothing",
         ),
         ("sixty_hertz", "rated_frequency", "so it is made for 60 Hz where 50 Hz is bound"),
         ("crash_in_dip", "limits", "s: its process died with SIGSEGV in fmi2DoStep"),

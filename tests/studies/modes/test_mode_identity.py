@@ -145,7 +145,7 @@ def test_modes_that_merge_on_the_way_are_told_with_the_place():
     assert hertz_of(off) == {"mine": pytest.approx(6.0 / (2 * np.pi), rel=1e-3)}
     found = settle_names(on, never, {"off": off})
     assert found.naming.named == {}
-    assert "meets another one 49% of the way from there" in found.naming.reasons["mine"]
+    assert "meets another one 49 % of the way from there" in found.naming.reasons["mine"]
 
 
 def test_two_names_never_go_to_one_mode():

@@ -209,7 +209,7 @@ def test_the_page_shows_where_energy_flows(gfor, tmp_path, measured):
             replaced := replace(measured, places=(*measured.places, away)), locate(replaced)
         ).html()
         arrow = f"{fed.bus} → <beyond>" if sign > 0 else f"<beyond> → {fed.bus}"
-        assert escape(f"{arrow}: 100%") in page
+        assert escape(f"{arrow}: 100 %") in page
     code, _, _ = gfor(
         "signal", "source", csv(tmp_path / "pmu.csv", measured), "--html", tmp_path / "page.html"
     )

@@ -70,5 +70,5 @@ def test_the_first_line_lays_the_error_beside_the_swing_and_judges_nothing(gfor,
     moved = clean.p_mw[clean.time > 1.02] - clean.p_mw[0]
     assert float(megawatts) == pytest.approx(0.2 * np.abs(moved).max(), rel=0.1)
     assert "From the event on the model misses P by up to 2" in first
-    assert "pu that the plant swings (25% in the mean)" in first
+    assert "pu that the plant swings (25 % in the mean)" in first
     assert "Without --limits there is no verdict." in first

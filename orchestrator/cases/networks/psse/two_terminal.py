@@ -80,8 +80,9 @@ class TwoTerminal(HeldDevice):
         """Yield how much less than its order a line carries."""
         order = self._order(pole.rectifier_kv, pole.inverter_kv)
         if pole.current < (1 - _SHORT) * order:
+            megawatts, part = pole.rectifier_kv * pole.current, 100 * pole.current / order
             text = (
-                f"it carries {pole.rectifier_kv * pole.current:.4g} MW, {pole.current / order:.1%} of its order: "
+                f"it carries {megawatts:.4g} MW, {part:.1f} % of its order: "
                 "firing angle at its least; its taps are held, where PSS/E moves them"
             )
             yield Remark(text, "a DC line that carries less than its order")

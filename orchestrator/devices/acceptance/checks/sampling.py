@@ -55,7 +55,8 @@ def sample_time(subject: Subject) -> CheckResult:
             )
         said = f"its outputs change every {_seconds(finer)} only; with steps of {_seconds(h)} that is every step"
         return passed("sample_time", said, sample_time=finer)
-    idle = f"its outputs change every {_seconds(own)} only: {1 - h / own:.0%} of all steps of {_seconds(h)} do nothing"
+    part = f"{100 * (1 - h / own):.0f} % of all steps of {_seconds(h)}"
+    idle = f"its outputs change every {_seconds(own)} only: {part} do nothing"
     if own > _IDLE * h and subject.step_is_given:
         return failed("sample_time", "step not honoured", idle, sample_time=own)
     remedy = f"couple it with steps of {_seconds(own)} or multiples of it; what it answers in between is old"

@@ -171,11 +171,12 @@ def _evenly(giving: CheckResult, taking: CheckResult) -> CheckResult:
         result.figures["Q_in_parts_of_the_first_cycle"] for result in (giving, taking)
     )
     if settled and min(kept, kept_now) < 1 - _TURNED and max(kept, kept_now) > 1 + _TURNED:
-        says = f"of the reactive power that less voltage brings in the first cycle {kept_now:.0%} are left in the end "
+        left = f"{100 * kept_now:.0f} % are left in the end"
+        says = f"of the reactive power that less voltage brings in the first cycle {left} "
         return failed(
             "signs",
             "uneven droop",
-            f"{says}while it takes power, and {kept:.0%} while it gives some",
+            f"{says}while it takes power, and {100 * kept:.0f} % while it gives some",
             **taking.figures,
         )
     return taking

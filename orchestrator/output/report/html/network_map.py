@@ -36,7 +36,7 @@ def network_map(
         for a, b in branches
     ]
     for (a, b), part in flows.items():
-        parts += _arrow(at[a], at[b], part, f"{a} → {b}: {part:.0%}")
+        parts += _arrow(at[a], at[b], part, f"{a} → {b}: {100 * part:.0f} %")
     for bus, place in at.items():
         share = min(max(heat[bus], 0.0), 1.0)
         parts.append(_circle(place, share, texts[bus]))

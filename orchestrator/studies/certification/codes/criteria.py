@@ -236,7 +236,7 @@ def responds_within(event: int, sign: int, longest: float, share: float = 0.9) -
             if np.isfinite(taken)
             else "it does not respond against the jump"
         )
-        rule = f"{share:.0%} of the first change within {1e3 * longest:g} ms"
+        rule = f"{100 * share:.0f} % of the first change within {1e3 * longest:g} ms"
         return _finding(f"speed at {time:g} s", rule, CODE, taken, longest, text, unit="s")
 
     return judge

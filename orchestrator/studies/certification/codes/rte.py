@@ -211,7 +211,7 @@ def _jumps(declared: Mapping[str, float], scr: float, power: float) -> CodeRow:
 
     return _row(
         _row_name("igfm1", scr, power),
-        f"∓{np.degrees(angle):.2g}° at SCR {scr:g}, {power:.0%}",
+        f"∓{np.degrees(angle):.2g}° at SCR {scr:g}, {100 * power:.0f} %",
         programme,
         stays_inside(0, partial(envelope, -1), "power after the jump ahead"),
         stays_inside(1, partial(envelope, 1), "power after the jump back"),
@@ -235,7 +235,7 @@ def _steps(declared: Mapping[str, float], scr: float, power: float) -> CodeRow:
 
     return _row(
         _row_name("igfm2", scr, power),
-        f"Source ∓{100 * CURRENT * X:.2g} % at SCR {scr:g}, {power:.0%}",
+        f"Source ∓{100 * CURRENT * X:.2g} % at SCR {scr:g}, {100 * power:.0f} %",
         programme,
         stays_inside(0, partial(envelope, -1), "current after the rise", reactive_current),
         stays_inside(2, partial(envelope, 1), "current after the fall", reactive_current),
@@ -258,7 +258,7 @@ def _strength(declared: Mapping[str, float], start: float, end: float, power: fl
 
     return _row(
         _row_name("igfm3", start, power, f"_scr{end:g}"),
-        f"SCR {start:g} → {end:g}, {power:.0%}",
+        f"SCR {start:g} → {end:g}, {100 * power:.0f} %",
         programme,
         stays_inside(0, envelope, "power after the step"),
     )
@@ -278,7 +278,7 @@ def _ramping(
     name = _row_name("igfm4", scr, power, f"_{rate:g}".replace(".", "_"))
     return _row(
         name,
-        f"±{rate:g} Hz/s for {lasts:g} s at SCR {scr:g}, {power:.0%}",
+        f"±{rate:g} Hz/s for {lasts:g} s at SCR {scr:g}, {100 * power:.0f} %",
         programme,
         stays_inside(2, partial(envelope, -1), "power while the frequency rises", skipped=2),
         stays_inside(4, partial(envelope, 1), "power while the frequency falls", skipped=2),
