@@ -113,11 +113,8 @@ def _fit_with(response: FrequencyResponse, real: int, pairs: int) -> IdentifiedM
     except (np.linalg.LinAlgError, ValueError):
         return None
     residues = np.asarray(fitting.residues).reshape(ports, ports, -1)[:p, :m]
-    constant = np.asarray(fitting.constant_coeff).reshape(ports, ports)[:p, :m].real
     blocks = _realisation(np.asarray(fitting.poles), residues, float(np.abs(data).max()))
-    from scipy.signal import cont2discrete  # noqa: PLC0415 - it takes a second to import
-
-    A, B, C, _, _ = cont2discrete((*blocks, constant), H, method="bilinear")
+    A, B, C = _over_a_step(*blocks, H)
     if not len(A) or not np.isfinite(A).all() or np.abs(np.linalg.eigvals(A)).max() >= 1:
         return None
     model = IdentifiedModel(
@@ -141,6 +138,21 @@ def _fit_with(response: FrequencyResponse, real: int, pairs: int) -> IdentifiedM
         inputs=response.inputs,
         outputs=response.outputs,
         error=error,
+    )
+
+
+def _over_a_step(A: Matrix, B: Matrix, C: Matrix, H: float) -> tuple[Matrix, Matrix, Matrix]:
+    """Return the model over a step by the bilinear transform.
+
+    It is what `scipy.signal.cont2discrete` computes, which takes a second to import."""
+    from scipy.linalg import solve  # noqa: PLC0415 - only where something is fitted
+
+    unit = np.eye(len(A))
+    ahead = unit - 0.5 * H * A
+    return (
+        solve(ahead, unit + 0.5 * H * A),
+        solve(ahead, H * B),
+        solve(ahead.transpose(), C.transpose()).transpose(),
     )
 
 

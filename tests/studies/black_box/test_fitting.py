@@ -65,6 +65,14 @@ def test_direct_feedthrough_is_kept_apart():
     )
 
 
+def test_a_model_over_a_step_is_scipys_to_the_last_bit():
+    rng = np.random.default_rng(2)
+    A, B, C = (rng.normal(size=shape) for shape in ((7, 7), (7, 2), (3, 7)))
+    wanted = scipy_signal.cont2discrete((A, B, C, np.zeros((3, 2))), 1e-3, method="bilinear")
+    found = fitting._over_a_step(A, B, C, 1e-3)
+    assert all(np.array_equal(one, other) for one, other in zip(found, wanted[:3], strict=True))
+
+
 def test_what_no_rational_model_fits_is_refused(monkeypatch):
     monkeypatch.setattr(fitting, "ORDERS", fitting.ORDERS[:4])
     measured = response(*wide_system())
