@@ -28,11 +28,32 @@ def is_ours(path: Path) -> bool:
     built = cache_directory("fmus")
     if path.resolve().is_relative_to(_resolved(built)):
         return intact(path) or not path.exists()  # described already, and built before it runs
-    size = path.stat().st_size
-    return any(
-        file.stat().st_size == size and filecmp.cmp(path, file, shallow=False) and intact(file)
+    found = path.stat()
+    seen = (
+        path,
+        found.st_size,
+        found.st_mtime_ns,
+        built,
+        built.exists() and built.stat().st_mtime_ns,
+    )
+    if seen in _STRANGERS:
+        return False
+    is_copy = any(
+        file.stat().st_size == found.st_size
+        and filecmp.cmp(path, file, shallow=False)
+        and intact(file)
         for file in built.glob("*/*.fmu")
     )
+    if not is_copy:
+        _STRANGERS.add(seen)
+    return is_copy
+
+
+_STRANGERS: set[tuple[object, ...]] = set()
+"""Files that were compared with every built FMU and are no copy of one, with what both were like then.
+
+A run asks some twenty times, and a cache may hold hundreds. Whoever counts as a stranger too long only runs in a
+process of its own; that a file is ours is looked at each time."""
 
 
 @cache

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fmus.toolchain.cache import cache_directory
+from fmus.toolchain.cache import cache_directory, keep
 from orchestrator.cases.case import BUILT_IN, load_case
 from orchestrator.core.errors import AnalysisError, CaseError
 from orchestrator.devices.fmi.instance import is_ours
@@ -139,6 +139,19 @@ def test_a_model_of_ours_is_ours_before_it_is_built(monkeypatch, tmp_path):
     stranger.parent.mkdir(parents=True, exist_ok=True)
     stranger.write_bytes(b"of somebody else")
     assert not is_ours(stranger)
+
+
+def test_a_stranger_is_ours_once_the_same_is_built(monkeypatch, tmp_path):
+    """What was found of a file counts as long as nothing is built, and the file stays as it was."""
+    monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path))
+    copy, built = tmp_path / "copy.fmu", cache_directory("fmus") / "key" / "gfor.fmu"
+    copy.write_bytes(b"an FMU")
+    assert not is_ours(copy)
+    built.parent.mkdir(parents=True)
+    keep(built, b"an FMU")
+    assert is_ours(copy)
+    copy.write_bytes(b"another")
+    assert not is_ours(copy)
 
 
 # -- what is refused, with its line and the remedy -------------------------------------------------
