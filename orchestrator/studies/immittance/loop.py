@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from orchestrator.core.arrays import Complex, Numbers, Vector
+from orchestrator.core.arrays import Complex, Flags, Numbers, Vector
 from orchestrator.studies.immittance.sides import ON_AXIS, Known, Side, Together, Unit
 
 _STEP = np.deg2rad(25.0)  # largest turn of det(1 + L) from one point of the path to the next
@@ -233,18 +233,29 @@ def followed(eigenvalues: Vector) -> Complex:
     """Eigenvalues with each column one of them, followed from point to point by the least sum of distances."""
     found = eigenvalues.copy()
     n = found.shape[1]
+    if n == 2:
+        crosses = _crossings(found)
+        found[crosses] = found[crosses, ::-1]
+        return found
     for k in range(1, len(found)):
-        before, now = found[k - 1], found[k]
-        if n == 2:
-            straight, crossed = np.abs(now - before).sum(), np.abs(now[::-1] - before).sum()
-            if crossed < straight:
-                found[k] = now[::-1]
-        else:
-            from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - half a second to import
+        from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - half a second to import
 
-            far = np.abs(before[:, None] - now[None, :])
-            found[k] = now[linear_sum_assignment(far)[1]]
+        far = np.abs(found[k - 1][:, None] - found[k][None, :])
+        found[k] = found[k][linear_sum_assignment(far)[1]]
     return found
+
+
+def _crossings(pairs: Vector) -> Flags:
+    """Where the two of a point change places: each differs from the point before as it stands by then."""
+    straight = np.abs(pairs[1:] - pairs[:-1]).sum(axis=1)
+    crossed = np.abs(pairs[1:, ::-1] - pairs[:-1]).sum(axis=1)
+    changes, stays = crossed < straight, straight < crossed
+    found, is_changed = [False], False
+    for change, stay in zip(changes.tolist(), stays.tolist(), strict=True):
+        # where neither is nearer, a point stays as it is
+        is_changed = stay if is_changed else change
+        found.append(is_changed)
+    return np.array(found)
 
 
 def nodes_of(
