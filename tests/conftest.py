@@ -114,6 +114,16 @@ def _write_empty(figure, file, **how):
 
 
 @pytest.fixture
+def in_process(monkeypatch):
+    """FMUs of others run in this process, where nothing else is asked for: a process of its own is half a second each.
+
+    For tests whose subject is another one; `tests/devices/sandbox` and others look at isolation."""
+    monkeypatch.setattr(
+        "orchestrator.devices.fmi.instance.is_isolated", lambda _, isolated: bool(isolated)
+    )
+
+
+@pytest.fixture
 def gfor(capsys, monkeypatch):
     """Run the command; returns exit code, standard output and standard error, without the lines of progress that come
     every 30 s on a busy machine."""

@@ -23,6 +23,8 @@ from tests.devices.acceptance.gallery.build import Source, Variable, build
 from tests.support.scenarios import prepare_one
 from tests.systems.coupling.small_fmus import small_fmu
 
+pytestmark = pytest.mark.usefixtures("in_process")
+
 STATES = {"x": 2, "v": 3}
 
 

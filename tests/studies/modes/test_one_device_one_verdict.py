@@ -17,6 +17,11 @@ from orchestrator.studies.black_box import coupled_modes
 from orchestrator.studies.black_box.frequency_response import Excitation
 from tests.support import vendor
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
+in_process = pytest.mark.usefixtures("in_process")
+"""The device is in a process of its own where a mark is missing: with the right binding, and with a wrong sign."""
+
 
 @pytest.fixture(scope="module")
 def fmu(tmp_path_factory):
@@ -82,6 +87,7 @@ def test_sign_and_limit_are_found_alike(typed, bound, check, fault):
     assert REMEDIES[fault] in said
 
 
+@in_process
 @pytest.mark.parametrize(("i_max", "above"), [(0.65, True), (1.5, False)])
 def test_a_run_finds_a_limit_that_a_dip_exceeds(typed, i_max, above):
     """It gives 0.6 pu at rest, and its limit is at 1.5 pu."""
@@ -106,6 +112,7 @@ def test_a_run_finds_a_limit_that_a_dip_exceeds(typed, i_max, above):
         assert 0.7 < finding["mean"] < 0.9
 
 
+@in_process
 @pytest.mark.parametrize("bound", [{"v_n": 230.0}, {"rating": 4.0}])
 def test_another_rating_than_delivered_is_told(typed, fmu, bound, tmp_path):
     told = checked(typed, "binding", **bound)["binding"]
@@ -120,6 +127,7 @@ def test_another_rating_than_delivered_is_told(typed, fmu, bound, tmp_path):
         component.close()
 
 
+@in_process
 @pytest.mark.parametrize(
     ("bound", "said"),
     [
@@ -143,6 +151,7 @@ def test_a_rating_a_little_off_is_named_and_is_the_likely_cause(typed, fmu, boun
     )
 
 
+@in_process
 @pytest.mark.parametrize(("i_max", "found"), [(1.05, True), (1.5, False)])
 def test_a_limit_that_is_exceeded_in_a_dip_alone_is_found_in_a_run(typed, i_max, found):
     _, out, _ = typed("run", "case.toml", "--out", "r", "--json", i_max=i_max, depth=0.7)
@@ -155,6 +164,7 @@ def test_a_limit_that_is_exceeded_in_a_dip_alone_is_found_in_a_run(typed, i_max,
         assert "; 1.05 pu is declared; " in finding["message"]
 
 
+@in_process
 @pytest.mark.slow
 def test_a_device_that_does_not_fit_its_binding_is_not_called_stable(typed, monkeypatch):
     # one second of excitation instead of twenty: what is judged here lies in the device's steady state
@@ -205,6 +215,7 @@ def test_a_right_binding_is_not_accused(typed, fmu, tmp_path):
         component.close()
 
 
+@in_process
 @pytest.mark.parametrize(
     ("begins", "f_n", "lag"),
     [

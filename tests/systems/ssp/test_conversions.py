@@ -34,6 +34,8 @@ from tests.systems.ssp.test_reading import (
     with_other_fmus,
 )
 
+pytestmark = pytest.mark.usefixtures("in_process")
+
 OUTPUT = MILLI + b'initial="calculated">\n      <Real unit="1" />'
 INPUT = b'causality="input" variability="continuous">\n      <Real unit="1" start="0.0" />'
 UNITS = b"<UnitDefinitions>"
