@@ -10,6 +10,8 @@ from orchestrator.core.errors import AnalysisError
 from orchestrator.linear.signals.ambient import ambient_modes
 from tests.support.forced_records import model, record, sine, times_of
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 def shaken(modes, length=120.0, seed=0, rate=20.0):
     """Two signals of modes (Hz, %) that white noise shakes, with opposite signs in the second mode."""

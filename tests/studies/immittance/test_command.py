@@ -13,6 +13,8 @@ from orchestrator.studies.immittance.scan import PortPoint, Scan
 from orchestrator.studies.immittance.scan_files import write_ztool
 from tests.studies.immittance.plants import OMEGA, Line, constant_power, is_stable
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 F = np.unique(np.concatenate([np.geomspace(0.5, 1000, 250), np.linspace(40, 60, 60)]))
 PLANT = constant_power(g=1.2, h=0.6, T=0.003, G=0.2)
 STRONG, WEAK = Line(0.05, 0.8 / OMEGA), Line(0.05, 1.2 / OMEGA)

@@ -13,6 +13,8 @@ from orchestrator.studies.operating_points.points_file import settings_in
 from tests.studies.immittance.plants import constant_power
 from tests.studies.immittance.test_command import F, files
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 STRONGER = constant_power(g=0.6, h=0.6, T=0.003, G=0.2)
 
 

@@ -7,6 +7,8 @@ import pytest
 
 from tests.studies.interactions.park import GUIDE, folder, park, studied
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 MINUS = str.maketrans("−", "-")
 
 

@@ -9,6 +9,8 @@ from orchestrator.studies.runs.run import run_scenario
 from orchestrator.systems.coupling.bus_relays import Relays
 from tests.support.mill import MACHINES, RAW, mill_case
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 OWN_RELAY = "1 'VTGTPAT' 2 2 '1' 0.8 9 0.05 0"
 
 

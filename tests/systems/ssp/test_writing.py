@@ -23,6 +23,8 @@ from orchestrator.systems.coupling.schedule import jacobi
 from tests.support.scenarios import prepare_one
 from tests.systems.coupling.small_fmus import small_fmu
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 SMALL_CASE = f"""
 name = "small"
 title = "Two integrators and a source"

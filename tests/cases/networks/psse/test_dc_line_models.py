@@ -23,6 +23,8 @@ from tests.cases.networks.psse.test_dyr import CASE, DYR
 from tests.cases.networks.psse.test_dyr_converters import PHASORS
 from tests.support.scenarios import prepare_one
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 CDC4T = """\
 'TIE 1' 'CDC4T' 5 15 0.05 0.04 0.6 0.65 0.1 80 0.8 0.12 50 60 5 4
   20 100 130 220 240 250 300 0.15 /

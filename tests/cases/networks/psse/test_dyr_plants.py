@@ -12,6 +12,8 @@ from orchestrator.core.errors import CaseError
 from tests.cases.networks.psse.test_dyr_following import REGCA1, dyr, prepared, record
 from tests.support.mill import mill_case
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 __all__ = ["prepared"]  # the fixture
 PLANT = (
     "3 'REPCA1' 1 0 0 0 '{}' 0 0 1 0.02 18 5 0 0.05 0 0 0 0.02 0.1 -0.1 -1 1 0.43 -0.43 1 0.05 0.25 "

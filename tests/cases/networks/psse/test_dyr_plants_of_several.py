@@ -12,6 +12,8 @@ from tests.cases.networks.psse.test_dyr import DYR
 from tests.cases.networks.psse.test_dyr_converters import PHASORS
 from tests.support.scenarios import prepare_one
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 UNIT = """\
 3 'REGCA1' '{0}' 1 0.02 10 0.9 0.4 1.22 1.2 0.8 0.4 -1.3 0.02 0.7 999 -999 0.7 /
 3 'REECB1' '{0}' 0 0 0 0 0 -99 99 0.02 0 0 0 1.1 -1.1 0 0.05 0.4 -0.4 1.1 0.9 0 0.1 1 40 0.03 99 -99 1 0 1.2 0.05 /

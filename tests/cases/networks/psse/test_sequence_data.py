@@ -12,6 +12,8 @@ from orchestrator.core.errors import CaseError, InputError
 from orchestrator.face.cli import main
 from tests.cases.networks.psse import LINES, LOADS, REACTANCES, TRANSFORMERS, raw, records
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 DYR = "\n".join(f"{n} 'GENCLS' 1 {h} 0.0 /" for n, h in ((1, 9.55), (2, 3.33), (3, 2.35)))
 BASES = {1: 247.5, 2: 192.0, 3: 128.0}
 X2 = {1: 0.13, 2: 0.22, 3: 0.21}
