@@ -115,12 +115,14 @@ def test_every_machines_speed_is_nearer_to_powerfactorys_than_tops_speed_is(case
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_the_fmus_follow_the_independent_equations(case):
+    """To 5 s: the four seconds behind the fault are the first swings, which are the largest."""
     _, speeds = errors_of_fmus(case)
     equations = ShortCircuit(tops_system(CASES[case]), "short-circuit", step=1e-3).speeds(
-        DURATION[CASES[case]]
+        DURATION[CASES[case]], stop=4.995
     )
     swing = np.sqrt(np.mean((equations - 1) ** 2))
-    assert np.sqrt(np.mean((speeds - equations) ** 2)) < 3e-3 * swing
+    apart = speeds[: len(equations)] - equations
+    assert np.sqrt(np.mean(apart**2)) < 3e-3 * swing
 
 
 @pytest.mark.slow

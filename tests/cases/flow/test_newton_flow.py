@@ -4,6 +4,7 @@ is no solution.
 
 import cmath
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -22,8 +23,9 @@ pytestmark = pytest.mark.filterwarnings("ignore:tap_dependency_table:Deprecation
 SMALL = ["case9", "case14", "case39", "case57", "case118"]
 
 
+@cache
 def of_pandapower(name, **options):
-    """A network solved by pandapower: its elements in our form, and its voltages by bus."""
+    """A network solved by pandapower: its elements in our form, voltages by bus, and itself; nobody changes them."""
     net = getattr(networks, name)()
     pandapower.runpp(
         net,
@@ -53,9 +55,8 @@ def of_pandapower(name, **options):
     }
     turn = voltages[data.slack] / abs(voltages[data.slack])
     limits = {bus: (g.q_min_mvar / 100, g.q_max_mvar / 100) for bus, g in data.generation.items()}
-    return (data.buses, lines, loads, units, data.slack, shunts, limits), {
-        b: v / turn for b, v in voltages.items()
-    }
+    elements = data.buses, lines, loads, units, data.slack, shunts, limits
+    return elements, {b: v / turn for b, v in voltages.items()}, net
 
 
 @pytest.mark.parametrize(
@@ -67,7 +68,7 @@ def of_pandapower(name, **options):
     ],
 )
 def test_voltages_are_pandapowers(name):
-    elements, voltages = of_pandapower(name)
+    elements, voltages, _ = of_pandapower(name)
     flow = solve_power_flow(*elements)
     # a branch of negative reactance is merged with its star point, which is no bus then
     assert len(flow.voltages) >= len(voltages) - 1
@@ -77,10 +78,8 @@ def test_voltages_are_pandapowers(name):
 
 @pytest.mark.parametrize("name", ["case9", "case14", "case39"])
 def test_flows_and_losses_are_pandapowers(name):
-    elements, _ = of_pandapower(name)
+    elements, _, net = of_pandapower(name)
     flow = solve_power_flow(*elements)
-    net = getattr(networks, name)()
-    pandapower.runpp(net, numba=False, tolerance_mva=1e-9, voltage_depend_loads=False)
     ours = [
         line.powers(flow.voltages[line.from_bus], flow.voltages[line.to_bus]) for line in flow.lines
     ]
@@ -148,7 +147,7 @@ def test_the_jacobian_is_the_derivative_of_the_mismatch():
 
 
 def test_limits_of_reactive_power_as_pandapower_keeps_them():
-    elements, voltages = of_pandapower("case118", enforce_q_lims=True)
+    elements, voltages, _ = of_pandapower("case118", enforce_q_lims=True)
     free = solve_power_flow(*elements)
     assert len(free.beyond_limits) > 3
     assert not free.at_limits

@@ -191,16 +191,22 @@ def noise_of(noise, steps=20_000, others=(), **options):
     return arrived(system, steps=steps, **options)[:, 0]
 
 
-def test_noise_has_its_deviation_and_no_memory(inner_loop):
-    values = noise_of(Noise(0.3, 1), 20_000 if inner_loop == "compiled" else 3000)
+IN_C = pytest.mark.parametrize("inner_loop", ["compiled"], indirect=True)
+"""Of many values: a test below holds those of Python to the same bits."""
+
+
+@IN_C
+def test_noise_has_its_deviation_and_no_memory():
+    values = noise_of(Noise(0.3, 1), 20_000)
     n = len(values)
     assert abs(values.mean()) < 4 * 0.3 / np.sqrt(n)
     assert abs(values.std() / 0.3 - 1) < 4 / np.sqrt(2 * n)
     assert abs(np.corrcoef(values[1:], values[:-1])[0, 1]) < 4 / np.sqrt(n)
 
 
-def test_noise_with_a_bandwidth_has_the_same_deviation_and_the_low_pass_memory(inner_loop):
-    values = noise_of(Noise(0.3, 1, bandwidth=20.0), 60_000 if inner_loop == "compiled" else 20_000)
+@IN_C
+def test_noise_with_a_bandwidth_has_the_same_deviation_and_the_low_pass_memory():
+    values = noise_of(Noise(0.3, 1, bandwidth=20.0), 60_000)
     keep = np.exp(-2 * np.pi * 20.0 * H)
     effective = len(values) * (1 - keep) / (1 + keep)
     assert abs(values.std() / 0.3 - 1) < 4 / np.sqrt(2 * effective)
@@ -208,12 +214,12 @@ def test_noise_with_a_bandwidth_has_the_same_deviation_and_the_low_pass_memory(i
 
 
 def test_noise_is_the_same_to_the_last_bit_whatever_else_there_is():
-    alone = noise_of(Noise(0.3, 1, 50.0), 3000)
+    alone = noise_of(Noise(0.3, 1, 50.0), 1000)
     assert np.array_equal(
-        alone, noise_of(Noise(0.3, 1, 50.0), 3000, others=[Noise(1.0, 1), Delay(5 * H)])
+        alone, noise_of(Noise(0.3, 1, 50.0), 1000, others=[Noise(1.0, 1), Delay(5 * H)])
     )
-    assert np.array_equal(alone, noise_of(Noise(0.3, 1, 50.0), 3000, parts=7))
-    assert not np.array_equal(alone, noise_of(Noise(0.3, 2, 50.0), 3000))
+    assert np.array_equal(alone, noise_of(Noise(0.3, 1, 50.0), 1000, parts=7))
+    assert not np.array_equal(alone, noise_of(Noise(0.3, 2, 50.0), 1000))
 
 
 def test_two_connections_with_one_seed_have_different_noise():
