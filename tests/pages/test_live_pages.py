@@ -163,7 +163,7 @@ def test_a_doubled_gain_is_a_question_and_words_have_the_pages_size_on_a_phone(w
 def test_the_double_of_a_value_may_lie_between_two_that_were_computed(window):
     """Of a tie of 0.08 pu, 0.16 was not computed: the straight line there is told, with its error."""
     path = ROOT / ".docs" / "live" / "kundur.html"
-    name, corners = "grid.X_tie_8_9_2", (0.1438, 0.1881)
+    name, corners = "grid.X_tie_8_9_1", (0.1438, 0.1881)
     held = {tuple(one["values"].items()): one["answer"] for one in saved(path)["answers"]}
     answers = [held[((name, x),)]["modes"]["scenarios"][0]["modes"] for x in corners]
     growing = [next(complex(m["real"], m["imag"]) for m in one if m["real"] > 0) for one in answers]
@@ -184,7 +184,7 @@ def test_a_question_names_the_few_values_at_which_it_is_stable(window):
     view = window(viewport={"width": 1280, "height": 900})
     view.goto((ROOT / ".docs" / "live" / "kundur.html").as_uri())
     said = {}
-    for name in ("grid.load_7.scale", "grid.load_9.scale", "grid.X_tie_8_9_2"):
+    for name in ("grid.load_7.scale", "grid.load_9.scale", "grid.X_tie_8_9_1"):
         view.get_by_role("button", name=f"Which {name} damps most?").click()
         said[name] = view.inner_text("#else-said").partition("%. ")[2].partition(" show it")[0]
     view.evaluate(
@@ -196,9 +196,20 @@ def test_a_question_names_the_few_values_at_which_it_is_stable(window):
     assert said == {
         "grid.load_7.scale": "Unstable at all of them.",
         "grid.load_9.scale": "Stable at 0.342, 0.5, 0.5848, 0.7647 only.",
-        "grid.X_tie_8_9_2": "Stable at 0.022 only.",
+        "grid.X_tie_8_9_1": "Stable at 0.022 only.",
     }
     assert beside.startswith("Computed nearby, with grid.load_9.scale = 0.5: stable")
+
+
+def test_two_lines_side_by_side_have_their_number_at_their_flow(window):
+    """Of two ties of Kundur's the picture had room for one figure, which looked like that of both."""
+    view = window(viewport={"width": 1280, "height": 900})
+    view.goto((ROOT / ".docs" / "live" / "kundur.html").as_uri())
+    view.locator("#names text").first.wait_for(state="attached")
+    said = view.evaluate("names.labels.flatMap(one => one.words)")
+    assert len([text for text in said if re.fullmatch(r"2 × \d+ MW", text)]) == 2
+    odd = view.evaluate("flowLabel([{x: 0, y: 0, p: 150}, {x: 2, y: 0, p: 50.4}]).words")
+    assert odd == ["2 lines: 200 MW"]
 
 
 def test_a_typed_value_that_was_not_computed_is_told_with_the_one_that_is_shown(window):

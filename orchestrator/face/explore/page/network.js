@@ -40,6 +40,12 @@ function things(kind, name, label, ...children) {
   group.addEventListener("pointerleave", hideTip);
   return group;
 }
+// What lines between two buses carry: of several that of each where it is the same, else the sum.
+function flowLabel(lines) {
+  const [first] = lines, count = lines.length, sum = Math.abs(lines.reduce((all, one) => all + one.p, 0)), mean = key => lines.reduce((all, one) => all + one[key], 0) / count;
+  const alike = lines.every(one => fixed(one.p, 0) === fixed(first.p, 0)), several = alike ? `${count} × ${fixed(Math.abs(first.p), 0)} MW` : `${count} lines: ${fixed(sum, 0)} MW`;
+  return { x: mean("x"), y: mean("y"), r: 6, look: "flow", words: [count > 1 ? several : `${fixed(sum, 0)} MW`], size: sum };
+}
 function paintNetwork() {
   if (state.tab !== "network") return;
   const svg = $("network"), d = seen.info?.diagram, flow = flowOf(), focused = document.activeElement?.dataset?.thing;
@@ -50,7 +56,7 @@ function paintNetwork() {
   const at = Object.fromEntries(d.buses.map(b => [b.name, b])), volts = Object.fromEntries((flow?.buses ?? []).map(b => [b.name, b]));
   const branches = Object.fromEntries((flow?.branches ?? []).map(b => [b.name, b])), machines = Object.fromEntries((flow?.machines ?? []).map(m => [m.name, m]));
   const most = Math.max(1, ...(flow?.branches ?? []).map(b => Math.abs(b.p_from_mw)));
-  const few = d.buses.length <= 45, parts = [], between = {}, flows = [], ofUnits = [];
+  const few = d.buses.length <= 45, parts = [], between = {}, beside = {}, flows = [], ofUnits = [];
   names = { labels: [], taken: [] };
   const keepFree = (x, y, r) => names.taken.push({ x0: x - r, y0: y - r, x1: x + r, y1: y + r });
   const middle = { x: d.buses.reduce((s, b) => s + b.x, 0) / d.buses.length, y: d.buses.reduce((s, b) => s + b.y, 0) / d.buses.length };
@@ -68,10 +74,11 @@ function paintNetwork() {
     if (p !== null && closed) {
       const way = p >= 0 ? 1 : -1, ux = way * (b.x - a.x) / length, uy = way * (b.y - a.y) / length;
       group.append(draw("path", { class: "wire", d: arrow(mx - 5 * ux, my - 5 * uy, mx + 6 * ux, my + 6 * uy) }));
-      flows.push({ x: (mx + (a.x + b.x) / 2) / 2, y: (my + (a.y + b.y) / 2) / 2, r: 6, look: "flow", words: [`${fixed(Math.abs(p), 0)} MW`], size: Math.abs(p) });
+      (beside[key] ??= []).push({ x: (mx + (a.x + b.x) / 2) / 2, y: (my + (a.y + b.y) / 2) / 2, p: line.from < line.to ? p : -p });
     }
     parts.push(group);
   }
+  flows.push(...Object.values(beside).map(flowLabel));
   const perBus = {};
   const hang = (bus, k, all) => {  // around the bus, away from the middle of the picture
     const out = Math.atan2(bus.y - middle.y, bus.x - middle.x), a = out + (k - (all - 1) / 2) * 0.75;
