@@ -20,9 +20,18 @@ def joined(broker, name="load"):
 
 
 def gain(
-    broker, output="load.y", subscribed="load.u", silent_from=1e9, hangs_from=1e9, bad_from=1e9
+    broker,
+    output="load.y",
+    subscribed="load.u",
+    silent_from=1e9,
+    hangs_from=1e9,
+    bad_from=1e9,
+    deaf=False,
 ):
-    """The output is K·input + offset, with K and offset as gfor gives them."""
+    """The output is K·input + offset, with K and offset as gfor gives them.
+
+    A deaf one does not look for the command to leave: it goes on until the broker ends, unhurried.
+    """
     federate = joined(broker)
     y = h.helicsFederateRegisterGlobalPublication(federate, output, h.HELICS_DATA_TYPE_DOUBLE, "")
     u = h.helicsFederateRegisterSubscription(federate, subscribed, "")
@@ -38,11 +47,14 @@ def gain(
         now = h.helicsFederateRequestTime(federate, step * PERIOD + PERIOD / 2)
         if now >= h.HELICS_TIME_MAXTIME:
             break
+        if not deaf and h.helicsFederateGetCommand(federate) == "end":
+            break
         value = K * h.helicsInputGetDouble(u) + offset
         if now > hangs_from:
             time.sleep(60)
         if now > bad_from:
             value = float("nan")
+            time.sleep(0.05)
         if now < silent_from:
             h.helicsPublicationPublishDouble(y, value)
         step += 1
@@ -55,7 +67,7 @@ KINDS = {
     "wrong_input": {"subscribed": "load.uu"},
     "silent": {"silent_from": 1e-3},
     "hangs": {"hangs_from": 1e-3},
-    "nan": {"bad_from": 1e-3},
+    "nan": {"bad_from": 1e-3, "deaf": True},
 }
 
 if __name__ == "__main__":
