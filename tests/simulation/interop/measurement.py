@@ -20,6 +20,7 @@ from orchestrator.studies.runs.like import emulate
 from orchestrator.systems.coupling.system import System
 from tests.simulation.interop.jobs import job_of, write_ssp
 from tests.simulation.interop.systems import (
+    KINDS,
     MAGNIFIED,
     STEP_SIZE,
     STOP_TIME,
@@ -42,6 +43,9 @@ PACKAGES = {
     "mosaik": (("mosaik", "mosaik_api_v3"), "mosaik"),
     "pathsim": (("pathsim", "pathsim_fmi"), "pathsim-fmi"),
 }
+READ_SSP = ("fmpy_ssp", "ecos_executable")
+"""Masters that are given the archive."""
+
 COFMUPY_PYTHON = Path(
     os.environ.get("GFOR_COFMUPY_PYTHON", ROOT / ".venv-cofmupy" / "bin" / "python")
 )
@@ -85,56 +89,93 @@ def why_not(master: str, kind: str = "native") -> str | None:
     return f"not installed: pip install {package} (or the extra 'interop')"
 
 
-def measure(
-    master: str, kind: str, folder: Path, *, preload: bool | None = None
-) -> dict[str, Outcome]:
-    """Run all systems in a master, in a process of its own, and compare.
+@dataclass(frozen=True)
+class Given:
+    """What a master gave in one process: for the systems of each kind of FMU, and for the probe pair.
+
+    Attributes
+    ----------
+    systems
+        System and what is recorded of it, by kind and name.
+    results
+        Result of a job by kind and name; none where the master ended before.
+    said
+        Its return code and its last words.
+    """
+
+    systems: dict[tuple[str, str], tuple[System, list[str]]]
+    results: dict[tuple[str, str], dict]
+    said: str
+
+
+PROBES = ("Python-backed", "probes")
+
+
+def results_of(
+    master: str,
+    folder: Path,
+    kinds: tuple[str, ...] = KINDS,
+    *,
+    preload: bool = True,
+) -> Given:
+    """Run all systems of these kinds in a master, in one process of its own, and the probe pair if they are all.
+
+    A master takes longer to begin than to run; native FMUs come first, with nothing of Python loaded.
 
     Parameters
     ----------
     preload
-        Whether libpython is loaded into a host that is not Python; by default where the FMUs need it.
+        Whether libpython is loaded into a host that is not Python where the FMUs need it.
     """
-    jobs, systems = {}, {}
-    for name, coupled in SYSTEMS.items():
-        system, record = coupled.build(kind), list(coupled.record)
-        if master == "ecos_executable":
-            system, record = with_magnifier(system, coupled.record, kind)
-        jobs[name] = system, job_of(system, STEP_SIZE, STOP_TIME, record)
-        systems[name] = system, record
-    preload = kind == "Python-backed" if preload is None else preload
-    results = run(master, jobs, folder, preload=preload)
-    return {name: compare(MASTERS[master], *systems[name], results[name]) for name in jobs}
+    systems, jobs = {}, {}
+    for kind in sorted(kinds, key=KINDS.index, reverse=True):
+        for name, coupled in SYSTEMS.items():
+            system, record = coupled.build(kind), list(coupled.record)
+            if master == "ecos_executable":
+                system, record = with_magnifier(system, coupled.record, kind)
+            systems[kind, name] = system, record
+            jobs[kind, name] = system, job_of(system, STEP_SIZE, STOP_TIME, record)
+    if kinds == KINDS:
+        system = probe_system()
+        jobs[PROBES] = system, job_of(system, PROBE_STEP_SIZE, PROBE_STOP_TIME, list(SIGNALS))
+    return Given(systems, *_run(master, jobs, folder, preload=preload))
 
 
-def run_probes(master: str, folder: Path) -> dict:
-    """What a master gives for the probe pair."""
-    system = probe_system()
-    job = job_of(system, PROBE_STEP_SIZE, PROBE_STOP_TIME, list(SIGNALS))
-    return run(master, {"probes": (system, job)}, folder, preload=True)["probes"]
+def measure(master: str, kind: str, given: Given) -> dict[str, Outcome]:
+    """Compare what a master gave for all systems of a kind with the emulation."""
+    names = {system: (kind, system) for system in SYSTEMS}
+    assert set(names.values()) <= set(given.results), f"{master}: {given.said}"
+    return {
+        system: compare(MASTERS[master], *given.systems[name], given.results[name])
+        for system, name in names.items()
+    }
 
 
-def run(
-    master: str, jobs: dict[str, tuple[System, dict]], folder: Path, *, preload: bool
-) -> dict[str, dict]:
-    """Results of a master in a process of its own, which may abort when it ends."""
+def _run(
+    master: str, jobs: dict[tuple[str, str], tuple[System, dict]], folder: Path, *, preload: bool
+) -> tuple[dict[tuple[str, str], dict], str]:
+    """Results of a master in a process of its own, which may abort when it ends; and what it said."""
     command, results = [_python(master), str(DRIVERS), _driver(master)], {}
     for number, (name, (system, job)) in enumerate(jobs.items()):
         ssp, path, results[name] = (
             folder / f"{number}.{ending}" for ending in ("ssp", "json", "out")
         )
-        write_ssp(system, job, ssp)
-        host = ecos_host(preload=preload) if master == "ecos_executable" else {}
+        if master in READ_SSP:
+            write_ssp(system, job, ssp)
+        kind, _ = name
+        needs_it = preload and kind == "Python-backed"
+        host = ecos_host(preload=needs_it) if master == "ecos_executable" else {}
         path.write_text(json.dumps(job | {"ssp": str(ssp)} | host), encoding="utf-8")
         command += [str(path), str(results[name])]
     done = subprocess.run(
         command, capture_output=True, text=True, check=False, timeout=TIMEOUT, cwd=folder
     )
     said = f"return code {done.returncode}\n{done.stdout}\n{done.stderr}"[-4000:]
-    assert all(result.exists() for result in results.values()), f"{master}: {said}"
     return {
-        name: json.loads(result.read_text(encoding="utf-8")) for name, result in results.items()
-    }
+        name: json.loads(result.read_text(encoding="utf-8"))
+        for name, result in results.items()
+        if result.exists()
+    }, said
 
 
 def compare(rules: MasterRules, system: System, record: list[str], result: dict) -> Outcome:
