@@ -1,5 +1,6 @@
 """What other distributions declare under our entry-point groups, found, loaded and refused."""
 
+import json
 import os
 import subprocess
 import sys
@@ -17,6 +18,22 @@ from tests.pages.markdown import ROOT, blocks
 
 PAGE = ROOT / ".docs" / "how-to" / "ship-plug-ins.md"
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+
+
+TYPED = """
+import io, json, sys
+from contextlib import redirect_stderr, redirect_stdout
+from orchestrator.face.cli import main
+found = []
+for command in json.loads(sys.argv[1]):
+    with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as err:
+        try:
+            code = main(command)
+        except SystemExit as stop:
+            code = stop.code
+    found.append([code, out.getvalue(), err.getvalue()])
+print(json.dumps(found))
+"""
 
 
 @pytest.fixture
@@ -49,7 +66,13 @@ def installed(tmp_path, monkeypatch):
             check=False,
         )
 
-    run.install, run.site = install, site
+    def typed(*commands):
+        """Exit code, standard output and standard error of each command, all in one process."""
+        done = run("-c", TYPED, json.dumps(commands))
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)
+
+    run.install, run.site, run.typed = install, site, typed
     return run
 
 
@@ -70,22 +93,20 @@ GFOR = ("-m", "orchestrator.face.cli")
 
 
 def test_a_study_of_a_colleague_is_a_command_and_a_method(colleague):
-    listed = colleague(*GFOR, "--help")
-    assert "the least damped mode of each scenario (of grid-checks" in " ".join(
-        listed.stdout.split()
-    )
-    done = colleague(
-        *GFOR, "least-damped", "infinite_bus", "--scenario", "dip", "--below", "50", "--json"
-    )
+    typed = ("least-damped", "infinite_bus", "--scenario", "dip", "--below", "50", "--json")
+    done = colleague(*GFOR, *typed)
     assert done.returncode == 0, done.stderr
     assert '"damping_percent"' in done.stdout
     script = (
-        "import orchestrator as gfor; case = gfor.load('infinite_bus'); "
-        "print(case.least_damped('dip').as_json(), 'least_damped' in dir(case))"
+        "import orchestrator as gfor; from orchestrator.face.cli import main\n"
+        "case = gfor.load('infinite_bus')\n"
+        "print(case.least_damped('dip').as_json(), 'least_damped' in dir(case), 'and')\n"
+        "main(['--help'])"
     )
     again = colleague("-c", script)
-    assert "damping_percent" in again.stdout, again.stderr
-    assert again.stdout.strip().endswith("True")
+    found, _, listed = again.stdout.partition(" True and\n")
+    assert "damping_percent" in found, again.stderr
+    assert "the least damped mode of each scenario (of grid-checks" in " ".join(listed.split())
 
 
 def test_a_code_and_a_check_of_a_colleague_are_known(colleague):
@@ -115,22 +136,31 @@ def test_the_key_of_a_kept_point_follows_the_code_of_a_plug_in(colleague, monkey
     assert numbers_hash("grid_checks.codes") != before
 
 
-@pytest.mark.parametrize(
-    ("files", "value", "says"),
-    [
-        ({}, "absent.module:STUDY", "absent.module:STUDY, which cannot be imported (ModuleNotF"),
-        ({"bad.py": "STUDY = 3"}, "bad:STUDY", "is of the type int; it has to be a PointStudy or"),
-        ({"bad.py": "1 / 0"}, "bad:STUDY", "cannot be imported (ZeroDivisionError"),
-    ],
-)
-def test_a_broken_study_is_one_error_and_help_lives(installed, files, value, says):
-    installed.install("vendor", files, {"gfor_cosim.studies": {"broken": value}})
-    assert "a study (of vendor 1.0)" in installed(*GFOR, "--help").stdout
-    done = installed(*GFOR, "broken", "two_area")
-    assert done.returncode == 2
-    assert f"vendor 1.0 declares gfor_cosim.studies 'broken' as {value}" in done.stderr
-    assert says in done.stderr
-    assert "Traceback" not in done.stderr
+BROKEN = {
+    # study: what declares it, and what is said
+    "absent": (
+        "absent.module:STUDY",
+        "absent.module:STUDY, which cannot be imported (ModuleNotF",
+    ),
+    "number": ("number:STUDY", "is of the type int; it has to be a PointStudy or"),
+    "raises": ("raises:STUDY", "cannot be imported (ZeroDivisionError"),
+}
+
+
+def test_a_broken_study_is_one_error_and_help_lives(installed):
+    files = {"number.py": "STUDY = 3", "raises.py": "1 / 0"}
+    declared = {name: value for name, (value, _) in BROKEN.items()}
+    installed.install("vendor", files, {"gfor_cosim.studies": declared})
+    (code, listed, _), *found = installed.typed(
+        ["--help"], *([name, "two_area"] for name in BROKEN)
+    )
+    assert code == 0
+    assert listed.count("a study (of vendor 1.0)") == len(BROKEN)
+    for (name, (value, says)), (code, _, said) in zip(BROKEN.items(), found, strict=True):
+        assert code == 2, name
+        assert f"vendor 1.0 declares gfor_cosim.studies {name!r} as {value}" in said
+        assert says in said
+        assert "Traceback" not in said
 
 
 def test_studies_of_others_stand_behind_our_commands_with_their_first_sentence(installed):
@@ -249,14 +279,14 @@ def test_a_reader_an_engine_and_a_master_of_a_colleague_are_used(installed):
     }
     installed.install("vendor", {"vendor_files.py": code}, groups)
     (installed.site.parent / "a.rec").write_bytes(b"")
-    heard = installed(*GFOR, "signal", "identify", "a.rec", "f", "--json")
-    assert heard.returncode == 0, heard.stderr
-    assert '"frequency_hz": 1.0' in heard.stdout or '"frequency_hz": 0.99' in heard.stdout
     short = ("run", "infinite_bus", "--scenario", "dip", "--stop", "0.01")
-    ran = installed(*GFOR, *short, "--engine", "told")
-    assert ran.returncode == 0, ran.stderr
+    heard, ran, like = installed.typed(
+        ("signal", "identify", "a.rec", "f", "--json"),
+        (*short, "--engine", "told"),
+        (*short, "--like", "house", "--out", "like"),
+    )
+    assert [code for code, *_ in (heard, ran, like)] == [0, 0, 0], (heard, ran, like)
+    assert '"frequency_hz": 1.0' in heard[1] or '"frequency_hz": 0.99' in heard[1]
     for line in ("engine begins", "run begins ['gfor', 'grid']", "engine ends"):
-        assert line in ran.stdout
-    like = installed(*GFOR, *short, "--like", "house", "--out", "like")
-    assert like.returncode == 0, like.stderr
-    assert "like House 1" in like.stdout
+        assert line in ran[1]
+    assert "like House 1" in like[1]

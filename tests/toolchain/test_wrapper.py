@@ -34,9 +34,8 @@ def fault(library, guid, resources):
     """Whether the host's end touches memory that was freed by then."""
     python = [sys.executable, "-c", HOST, str(library), guid, resources.as_uri()]
     environment = {"PYTHONMALLOC": "malloc"}  # so that valgrind sees every block
-    done = subprocess.run(
-        ["valgrind", *python], env=environment, capture_output=True, text=True, check=False
-    )
+    call = ["valgrind", "--undef-value-errors=no", *python]  # freed memory alone, in half the time
+    done = subprocess.run(call, env=environment, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (0, "end\n"), done.stderr
     return "finalizePythonInterpreter" in done.stderr
 

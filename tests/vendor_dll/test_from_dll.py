@@ -324,8 +324,8 @@ def test_a_planted_fault_is_named(described, fault):
 
 
 ABORT, LOOP = (
-    f"__attribute__((constructor)) static void begin(void) {{ {words} }} "
-    for words in ("abort();", "for (;;) {}")
+    f"#include <unistd.h>\n__attribute__((constructor)) static void begin(void) {{ {words} }} "
+    for words in ("abort();", "for (;;) pause();")
 )
 TWICE = '"y", "", "", 9, 1}, {"y", "Lagged'
 BROKEN = {

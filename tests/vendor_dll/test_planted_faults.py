@@ -141,7 +141,8 @@ def test_where_it_keeps_its_state_is_named(tmp_path, planted):
 
 
 def test_a_sample_that_hangs_is_given_up_by_name(tmp_path):
-    fmu = as_fmu(compiled(lag(do="if (s->time > 0.05) for (;;) {}"), tmp_path))
+    source = lag(head="#include <unistd.h>\n", do="if (s->time > 0.05) for (;;) pause();")
+    fmu = as_fmu(compiled(source, tmp_path))
     report = check_fmu(fmu, limits=Limits(seconds=1.0), only=("runs",), run_for=0.5)
     assert not report.trusted
     assert any("hang" in fault or "time" in fault for fault in report.faults), report.faults

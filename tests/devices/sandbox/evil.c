@@ -64,7 +64,7 @@ static void act(void) {
         if (fork()) _exit(0);
         for (;;) pause();
     }
-    for (static volatile int spin;;) ++spin;
+    for (;;) pause();
 }
 #elif defined ACT_LEFT_CHILD /* which works on for ever beside the instance, and after it */
 static void act(void) {
