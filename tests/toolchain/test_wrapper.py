@@ -32,7 +32,7 @@ print("end")
 
 def fault(library, guid, resources):
     """Whether the host's end touches memory that was freed by then."""
-    python = [sys.executable, "-c", HOST, str(library), guid, resources.as_uri()]
+    python = [sys.executable, "-S", "-c", HOST, str(library), guid, resources.as_uri()]
     environment = {"PYTHONMALLOC": "malloc"}  # so that valgrind sees every block
     call = ["valgrind", "--undef-value-errors=no", *python]  # freed memory alone, in half the time
     done = subprocess.run(call, env=environment, capture_output=True, text=True, check=False)
