@@ -9,6 +9,8 @@ from tests.devices.acceptance.gallery.build import build
 from tests.devices.acceptance.gallery.members import converter
 from tests.devices.acceptance.test_late_outputs import CASE
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 def run(source, folder, capsys):
     """What `gfor run` says of a case with this converter: its JSON, and standard error."""

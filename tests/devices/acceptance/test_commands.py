@@ -28,6 +28,8 @@ from tests.devices.acceptance.gallery.build import build
 from tests.devices.acceptance.gallery.hostile import entities
 from tests.devices.acceptance.gallery.members import converter
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 FAST = ("--only", "power_balance", "--time-limit", "10")
 
 

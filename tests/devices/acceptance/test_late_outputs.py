@@ -10,6 +10,8 @@ from orchestrator.systems.coupling.coupled import _jump
 from orchestrator.systems.coupling.master import Master
 from tests.support.scenarios import prepare_one
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 CASE = """
 name = "late"
 title = "A converter of somebody else's"

@@ -15,6 +15,8 @@ from orchestrator.systems.coupling.events import LoadChange, UnitSwitching
 from orchestrator.systems.coupling.recorder import Recorder
 from tests.support.scenarios import prepare_one
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 DEEP = """
 name = "deep"
 [solver]
