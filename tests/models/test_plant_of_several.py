@@ -222,14 +222,16 @@ class Two:
 
 @pytest.mark.parametrize("mode", [0, 1, 2])
 def test_two_units_under_one_controller_are_those_by_hand(mode):
-    """Voltage and power of each unit after steps of the source and of references, from 15 ms on."""
+    """Voltage and power of each unit after steps of the source and of references, from 15 ms on.
+
+    To half a second, five times the longest lag of the controller."""
     at_rest = dict.fromkeys(CHANGES, 0.0)
     ours, hand = Two(mode, at_rest), TwoByHand(mode, at_rest)
     assert np.abs(ours.rate(ours.x, SOURCE)).max() < 1e-9
     assert max(map(abs, hand.rates(hand.x, SOURCE).values())) < 1e-12
     ours, hand = Two(mode, CHANGES), TwoByHand(mode, CHANGES)
-    found = ours.run(STEP * SOURCE, 1.0, 1e-3)[15:]
-    wanted = hand.run(STEP * SOURCE, 1.0, 1e-3)[15:]
+    found = ours.run(STEP * SOURCE, 0.5, 1e-3)[15:]
+    wanted = hand.run(STEP * SOURCE, 0.5, 1e-3)[15:]
     swings = np.ptp(wanted, axis=0)
     assert swings.min() > 2e-3
     assert (np.abs(found - wanted).max(axis=0) < 3e-4 * swings).all()

@@ -18,7 +18,10 @@ from orchestrator.studies.runs.answers_table import answers_table
 from tests.studies.screening.five_machines import five_machines
 from tests.support.scenarios import bare_scenario
 
-pytestmark = pytest.mark.filterwarnings("ignore::orchestrator.face.api.scenario.UnusualDataWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::orchestrator.face.api.scenario.UnusualDataWarning"),
+    pytest.mark.usefixtures("undrawn"),
+]
 
 # governors that feed the swing once the ring is open
 FAST = {"R": 0.02, "T_1": 0.3, "T_2": 0.0, "T_3": 0.6}

@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -62,14 +63,21 @@ def told(result):
     return summary, values, result.findings
 
 
+@cache
+def undisturbed(kind="python-backed"):
+    """All of a run that nobody interrupts."""
+    return told(run_scenario(prepared_scenario(kind)))
+
+
 @pytest.fixture
 def said():
     return []
 
 
 def interrupted(prepared, folder, said, at, times=1):
+    """A run to there, without modes, which have no part in what is kept."""
     kept = KeptOnce(prepared, folder, at=at, times=times, resume=False, say=said.append)
-    result = run_scenario(prepared, checkpoints=kept)
+    result = run_scenario(prepared, checkpoints=kept, linear=False)
     assert "interrupted at t = " in str(result.failure)
     return result
 
@@ -80,14 +88,21 @@ def resumed(prepared, folder, said):
     )
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("at", [0.4, 1.0, 1.15])
+@pytest.mark.parametrize(
+    ("at", "kind"),
+    [
+        *((at, "python-backed") for at in (0.4, 1.0, 1.15)),
+        (1.15, "native"),
+        (1.0, "isolated"),
+    ],
+)
 def test_an_interrupted_run_goes_on_to_the_last_bit(tmp_path, said, kind, at):
+    """Before, at and behind an event; and each kind of component, whose state is kept alike at any time."""
     prepared = prepared_scenario(kind)
     part = interrupted(prepared, tmp_path, said, at)
     assert part.dataset["time"].values[-1] < STOP - 0.1
     whole = resumed(prepared_scenario(kind), tmp_path, said)
-    assert told(whole) == told(run_scenario(prepared_scenario(kind)))
+    assert told(whole) == undisturbed(kind)
     assert said == []
 
 
@@ -180,7 +195,7 @@ def test_a_damaged_checkpoint_gives_way_to_the_one_before(tmp_path, said, damage
     result = resumed(prepared_scenario(), tmp_path, said)
     assert len(said) == 1
     assert "the one before it is taken, of t = 0.40" in said[0]
-    assert told(result) == told(run_scenario(prepared_scenario()))
+    assert told(result) == undisturbed()
 
 
 def test_two_damaged_checkpoints_are_refused(tmp_path, said):
@@ -363,7 +378,7 @@ def test_an_fmu_that_does_not_come_back_is_not_believed(tmp_path, said, monkeypa
         "'dip' is computed from its start again: component 'gfor' does not go on from its state"
         in said[0]
     )
-    assert told(result) == told(run_scenario(prepared_scenario()))
+    assert told(result) == undisturbed()
 
 
 def test_a_folder_that_cannot_be_written_is_refused_before_the_run(tmp_path, said):

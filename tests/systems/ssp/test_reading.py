@@ -349,6 +349,7 @@ def with_other_fmus(path, target, old, new):
     return target
 
 
+@pytest.mark.usefixtures("in_process", "undrawn")
 def test_what_cannot_be_linearised_is_simulated_all_the_same(tmp_path, capsys):
     plain = write(tmp_path / "ring.ssp", system("top", IN_RING, RING))
     path = with_other_fmus(plain, tmp_path / "closed.ssp", b'settable="true"', b'settable="false"')
