@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.studies.validation.recordings import run, table, with_noise
-from tests.studies.validation.test_planted import asked, of_frequency
+from tests.studies.validation.test_planted import EMT, asked, of_frequency
 from tests.support.late import LateLibrary
 
 scipy_signal = LateLibrary("scipy.signal")
@@ -58,7 +58,7 @@ def test_an_angle_against_another_bus_lacks_the_frequency_by_which_p_stays_off(g
 @pytest.mark.parametrize("degrees", [1, 4])
 def test_a_bus_that_swings_before_the_event_is_asked_about(good, degrees):
     """Though the model falls out of step by it."""
-    (found,) = asked(always_swinging(good, degrees))
+    (found,) = asked(always_swinging(good, degrees), device=EMT)
     assert found["kind"] == KIND
     assert found["figures"]["seen"] < 0.01 * found["figures"]["asked"]
 
@@ -66,12 +66,12 @@ def test_a_bus_that_swings_before_the_event_is_asked_about(good, degrees):
 @pytest.mark.parametrize("lag", [0.0, 0.1])
 def test_a_frequency_beside_the_angle_tells_it_and_stands_for_it_as_the_remedy_says(good, lag):
     spoilt = with_frequency(against_a_swing(good), good, lag)
-    found, *others = asked(spoilt)
+    found, *others = asked(spoilt, device=EMT)
     assert kinds(others) == ["slips"]  # by which the model falls out of step
     assert found["kind"] == KIND
     assert found["figures"]["remedy"] == "f=f_hz"
     assert "--channel 'f=f_hz'" in found["text"]
-    assert KIND not in kinds(asked(spoilt, channels=["f=f_hz"]))
+    assert KIND not in kinds(asked(spoilt, device=EMT, channels=["f=f_hz"]))
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.1, 0.3])

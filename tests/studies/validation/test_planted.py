@@ -26,8 +26,11 @@ from tests.support.late import LateLibrary
 
 scipy_signal = LateLibrary("scipy.signal")
 ON = {"pod_p.enabled": True}
-STEP = "500 us"
-"""Of the device, so that less time goes; a good recording is tried in steps of a coupled run as well."""
+PHASOR, EMT = "gfor_phasor", "gfor"
+STEPS = {PHASOR: "1 ms", EMT: "500 us"}
+"""Of the device, so that less time goes; a good recording is tried in steps of a coupled run as well.
+
+What is planted is in the recording: a phasor model of the plant shows it as its EMT model does, in a fifth of the time."""
 
 LENGTH = 4.0
 """Time after which a recording ends [s]: three after the event, which all that is planted needs."""
@@ -39,9 +42,9 @@ def good():
     return whole[whole.time <= LENGTH]
 
 
-def asked(frame, values=None, **more):
-    given = {"values": ON | (values or {}), "step": STEP} | more
-    found = gfor_in_python.validate("gfor", frame.set_index("time"), **given).as_json()
+def asked(frame, values=None, device=PHASOR, **more):
+    given = {"values": ON | (values or {}), "step": STEPS[device]} | more
+    found = gfor_in_python.validate(device, frame.set_index("time"), **given).as_json()
     return found["events"][0]["questions"]
 
 
@@ -272,10 +275,20 @@ PLANTED = {
 }
 
 
+OF_FLUXES = {
+    "Q alone is behind a lag of 20 ms",
+    "the magnitude is behind a lag of 20 ms",
+    "the magnitude is behind a lag of 200 ms",
+    "the angle is behind a lag of 20 ms",
+    "the angle is of a filtered frequency",
+}
+"""What shows beside a model with fluxes, as the plant has them: it is told by how the first 20 ms after a jump go."""
+
+
 @pytest.mark.parametrize("name", PLANTED)
 def test_a_planted_mistake_is_asked_about(good, name):
     spoil, kind = PLANTED[name]
-    questions = asked(spoil(good))
+    questions = asked(spoil(good), device=EMT if name in OF_FLUXES else PHASOR)
     (found,) = [one for one in questions if one["kind"] == kind]
     assert found["keeps_open"]
     assert found["figures"].get("reading", name) == name
@@ -290,13 +303,13 @@ def test_a_planted_mistake_is_asked_about(good, name):
     ],
 )
 def test_the_time_of_a_lag_is_told(good, column, seconds, kind, told):
-    (found,) = asked(lagged(good, column, seconds))
+    (found,) = asked(lagged(good, column, seconds), device=EMT)
     assert found["kind"] == kind
     assert found["figures"][told] == pytest.approx(seconds, rel=0.2)
 
 
 def test_a_jump_of_the_angle_is_told_with_its_size_and_time_and_nothing_beside_it(good):
-    (found,) = asked(with_angle_jump(good, -20))
+    (found,) = asked(with_angle_jump(good, -20), device=EMT)
     assert found["figures"]["jump"] == pytest.approx(-20, abs=0.2)
     assert found["figures"]["at"] == pytest.approx(3.0, abs=0.002)
 
@@ -315,7 +328,7 @@ def test_a_jump_of_the_grids_own_angle_is_not_accused():
 
 
 def test_a_block_that_is_stored_twice_is_told_with_its_times(good):
-    (found,) = asked(with_block_twice(good, 1.5, 100))
+    (found,) = asked(with_block_twice(good, 1.5, 100), device=EMT)
     figures = found["figures"]
     assert figures["count"] == 100
     assert figures["first"] == pytest.approx(1.5, abs=0.0015)
@@ -337,9 +350,9 @@ def test_a_plant_that_falls_out_of_step_itself_leaves_no_verdict_on_its_own_mode
     assert found.verdict == "open"
 
 
-@pytest.mark.parametrize("step", [STEP, "100 us"])
-def test_a_good_recording_is_not_asked_about(good, step):
-    assert asked(good, step=step) == []
+@pytest.mark.parametrize(("device", "step"), [(PHASOR, "1 ms"), (EMT, "500 us"), (EMT, "100 us")])
+def test_a_good_recording_is_not_asked_about(good, device, step):
+    assert asked(good, device=device, step=step) == []
 
 
 def test_a_transient_that_the_model_lacks_is_no_setpoint(good):
@@ -393,7 +406,7 @@ def test_a_plant_at_its_limit_is_not_clipped():
     limited = table(run("pod_p", stop=3.0, scale=1.12, **limits))
     values = {"current_limit.kind": 1, "current_limit.I_max": 1.02}
     for frame in (limited, with_noise(limited)):
-        assert "clipped" not in [one["kind"] for one in asked(frame, values)]
+        assert "clipped" not in [one["kind"] for one in asked(frame, values, device=EMT)]
 
 
 def test_a_signal_that_stands_still_by_itself_is_not_clipped():
@@ -470,7 +483,7 @@ HONEST = {
 
 @pytest.mark.parametrize("name", HONEST)
 def test_an_honest_recording_is_not_accused(good, name):
-    assert not [one for one in asked(HONEST[name](good)) if one["keeps_open"]]
+    assert not [one for one in asked(HONEST[name](good), device=EMT) if one["keeps_open"]]
 
 
 def test_a_filled_gap_is_told_and_counts_as_missing(good):
@@ -495,7 +508,7 @@ def test_a_gap_at_the_event_leaves_no_verdict(good, tmp_path):
 
 
 def test_samples_that_are_too_slow_name_the_controls_that_they_do_not_show(good):
-    questions = asked(good.iloc[::40])
+    questions = asked(good.iloc[::40], device=EMT)
     (found,) = [one for one in questions if one["kind"] == "slow samples"]
     assert "current_control.tau" in found["text"]
     assert "voltage_control.tau" not in found["text"]  # 3.2 Hz, and 4 Hz are told
@@ -568,7 +581,7 @@ def test_times_in_minutes_are_read_as_the_remedy_says(good):
 
 @pytest.mark.parametrize("wrong", [{"droop.R_f": 0.02}, {"transformer.X_t": 0.25}, {"pod_p.K": 50}])
 def test_an_honest_recording_beside_a_wrong_model_is_not_accused(good, wrong):
-    assert asked(good, values=wrong) == []
+    assert asked(good, values=wrong, device=EMT) == []
 
 
 def test_a_jump_of_the_phase_by_six_degrees_is_no_wrap_of_radians(good):
