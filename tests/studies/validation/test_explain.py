@@ -202,7 +202,7 @@ def test_what_the_voltage_between_samples_makes_is_taken_out_and_costs_what_is_u
 
 
 def test_a_response_that_comes_30_ms_late_is_named_with_its_time():
-    frame = with_noise(table(run("pod_p", stop=4.0)))
+    frame = with_noise(table(run("pod_p", stop=3.0)))
     late = {c: np.interp(frame.time - 0.03, frame.time, frame[c]) for c in ("p_mw", "q_mvar")}
     best, second, *_ = explained(frame.assign(**late), values=ON)
     assert (best.cause, best.name) == (CauseKind.DELAY, "delay of the whole response")
@@ -235,9 +235,9 @@ def test_a_limit_of_the_current_that_is_too_high_in_the_model_is_named_with_the_
 
 def test_no_cause_is_read_from_what_follows_a_setpoint_that_changed():
     """A right model, and a plant whose reference steps: a washout explained most of it, and was named."""
-    frame = with_noise(table(run("pod_p", stop=4.0)))
+    frame = with_noise(phasor_plant(pod_p__K=200.0))
     moved = frame.assign(p_mw=frame.p_mw + 75 * (frame.time > 2.5)).set_index("time")
-    found = gfor_in_python.validate("gfor", moved, values=ON, step=FINE, explain=True)
+    found = gfor_in_python.validate("gfor_phasor", moved, values=ON, step="1 ms", explain=True)
     (question,) = [
         one for one in found.as_json()["events"][0]["questions"] if one["kind"] == "setpoint"
     ]
@@ -252,9 +252,9 @@ def test_no_cause_is_read_from_what_follows_a_setpoint_that_changed():
 @pytest.mark.slow
 def test_a_setpoint_that_changes_within_the_event_is_no_gain():
     """A right model: a gain explained most of the step, and was named."""
-    frame = with_noise(table(run("pod_p", stop=4.0))).iloc[::20]
+    frame = with_noise(phasor_plant(pod_p__K=200.0)).iloc[::20]
     moved = frame.assign(p_mw=frame.p_mw + 68 * (frame.time > 1.05)).set_index("time")
-    found = gfor_in_python.validate("gfor", moved, values=ON, explain=True)
+    found = gfor_in_python.validate("gfor_phasor", moved, values=ON, step="1 ms", explain=True)
     (question,) = [
         one for one in found.as_json()["events"][0]["questions"] if one["kind"] == "setpoint"
     ]
@@ -268,7 +268,7 @@ def test_a_setpoint_that_changes_within_the_event_is_no_gain():
 @pytest.mark.slow
 def test_a_pod_that_is_off_in_the_plant_is_named_as_a_switch_and_no_setpoint_is_asked_about():
     """From 50 samples a second a model with the POD on leaves for good, as if a setpoint had changed."""
-    slow = with_noise(table(run("pod_p", stop=4.0, gfor__pod_p__enabled=False))).iloc[::20]
+    slow = with_noise(phasor_plant(pod_p__enabled=False)).iloc[::20]
     asked, found = (
         gfor_in_python.validate(
             "gfor_phasor", slow.set_index("time"), values=ON, step="1 ms", explain=explain

@@ -30,7 +30,7 @@ PHASOR, EMT = "gfor_phasor", "gfor"
 STEPS = {PHASOR: "1 ms", EMT: "500 us"}
 """Of the device, so that less time goes; a good recording is tried in steps of a coupled run as well.
 
-What is planted is in the recording: a phasor model of the plant shows it as its EMT model does, in a fifth of the time."""
+What is planted is in the recording: a phasor model shows it as the EMT model does, in a fifth of the time."""
 
 LENGTH = 4.0
 """Time after which a recording ends [s]: three after the event, which all that is planted needs."""
