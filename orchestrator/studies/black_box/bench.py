@@ -27,6 +27,7 @@ _SOURCE = Path(__file__).with_name("drive.c")
 _CALLS = {1: "fmi2SetReal", 2: "fmi2DoStep", 3: "fmi2GetReal"}
 # steps in one call of the C library; an interrupt from the keyboard takes effect between two
 _STRETCH = 20000
+_NOT_FINITE = -1  # status of drive.c where an output is no finite number
 
 STILL = 1e-9
 """Largest change of an output over a second [pu] at which the device counts as being in steady state; of its mean over
@@ -256,6 +257,29 @@ def drive(
     return outputs
 
 
+class Turning(ctypes.Structure):
+    """What ``drive_turning`` of drive.c is given, and where it stands."""
+
+    _fields_ = (
+        ("voltage", ctypes.c_void_p),
+        ("late", ctypes.c_void_p),
+        ("measured", ctypes.c_void_p),
+        ("along", ctypes.c_void_p),
+        ("angle", ctypes.c_void_p),
+        ("ahead", ctypes.c_void_p),
+        ("current", ctypes.c_void_p),
+        ("turns", ctypes.c_void_p),
+        ("count", ctypes.c_int64),
+        ("each", ctypes.c_int64),
+        ("gain", ctypes.c_double),
+        ("lasts", ctypes.c_double),
+        ("scale", ctypes.c_double),
+        ("turn", ctypes.c_double),
+        ("slow", ctypes.c_double),
+        ("rate", ctypes.c_double),
+    )
+
+
 class Stretches:
     """Stretches of a few steps of one component, one after the other, in rows that are laid out once.
 
@@ -276,6 +300,11 @@ class Stretches:
         self._rows = StepRows(component, names, self._inputs, self._outputs, self._late)
         self._steps = self._rows.at(index, step_size)
 
+    @property
+    def turns_at_once(self) -> bool:
+        """Return whether `turn` makes the steps: where many of them are one exchange, a stretch is one."""
+        return not self._component.takes_many(self._steps)
+
     def drive(self, inputs: Numbers, late: Numbers) -> Numbers:
         """Outputs after each step, as `drive` has them; valid until the next stretch."""
         count = self._steps.count = len(inputs)
@@ -284,6 +313,16 @@ class Stretches:
         _make(self._component, self._steps, outputs)
         self._steps.index += count
         return outputs
+
+    def turn(self, run: Turning) -> None:
+        """Make the steps of ``run``, in whole stretches, in one call."""
+        component, steps, failed = self._component, self._steps, (ctypes.c_int64 * 2)()
+        at = (ctypes.byref(one) for one in (steps, failed, run))
+        with calls:
+            status = _library().drive_turning(component.pointer, *_functions(component), *at)
+        if status == _NOT_FINITE:
+            raise _no_number(component)
+        _check(component, steps, status, failed)
 
 
 def _drive_stretch(
@@ -306,16 +345,30 @@ def _make(component: Component, steps: Steps, outputs: Numbers) -> None:
         if component.takes_many(steps):
             status = component.many_steps(component.pointer, *at)
         else:
-            each = (component.set_real, component.get_real, component.do_step)
-            functions = [ctypes.cast(one, ctypes.c_void_p) for one in each]
-            status = _library().drive(component.pointer, *functions, *at)
+            status = _library().drive(component.pointer, *_functions(component), *at)
+    _check(component, steps, status, failed)
+    if not np.isfinite(outputs).all():
+        raise _no_number(component)
+
+
+def _functions(component: Component) -> list[ctypes.c_void_p]:
+    """What the C library calls of a component."""
+    each = (component.set_real, component.get_real, component.do_step)
+    return [ctypes.cast(one, ctypes.c_void_p) for one in each]
+
+
+def _check(
+    component: Component, steps: Steps, status: int, failed: ctypes.Array[ctypes.c_int64]
+) -> None:
     if status:
         time = (steps.index + failed[0]) * steps.step_size
         component.check(status, _CALLS[failed[1]], time)
-    if not np.isfinite(outputs).all():
-        raise AnalysisError(
-            f"{component.description.path.name}: its current is no longer a finite number"
-        )
+
+
+def _no_number(component: Component) -> AnalysisError:
+    return AnalysisError(
+        f"{component.description.path.name}: its current is no longer a finite number"
+    )
 
 
 @cache
@@ -326,4 +379,5 @@ def _library() -> Any:
     except (OSError, RuntimeError) as error:
         raise InputError(f"the test bench is compiled, and {error}") from error
     library.drive.argtypes = [ctypes.c_void_p] * 6
+    library.drive_turning.argtypes = [ctypes.c_void_p] * 7
     return library

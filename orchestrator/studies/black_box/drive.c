@@ -1,6 +1,7 @@
 /* One FMU behind an ideal voltage: for every communication step set the inputs, step, read the outputs.
    `bench.py` calls it. Returns 0, or the status of the first call that is neither OK nor Warning. */
 #include "many_steps.h"
+#include <math.h>
 
 EXPORT int drive(void *component, get_set set_real, get_set get_real, do_step step, const struct steps *asked,
                  int64_t *failed) {
@@ -21,6 +22,81 @@ EXPORT int drive(void *component, get_set set_real, get_set get_real, do_step st
         status = get_real(component, asked->output_references, n_out, asked->outputs + k * asked->n_out);
         failed[1] = CALLED_GET;
         if (status > 1) return status;
+    }
+    return 0;
+}
+
+/* A run whose voltage turns with the component's current; `held_in_step.py` says why. Complex numbers are pairs. */
+struct turning {
+    const double *voltage, *late; /* for each step: that which is held, and that at which the outputs are read [pu] */
+    const double *measured;       /* the conjugate of the measured current's mean in each stretch */
+    const double *along;          /* times of a stretch's steps since its begin [s] */
+    double *angle, *ahead;        /* room for a stretch: the turn [rad], and its phasor */
+    double *current, *turns;      /* found for each step: the current, and by how much the turn counts */
+    int64_t count, each;          /* steps, and those of a stretch */
+    double gain, lasts, scale;    /* [1/s], [s], of the outputs */
+    double turn, slow, rate;      /* where it stands [rad], [rad], [rad/s] */
+};
+
+enum { NOT_FINITE = -1 };
+
+/* The product as NumPy rounds it: with one rounding less in each part. */
+static void times(const double *a, const double *b, double *product) {
+    const double re = a[0], im = a[1];
+    product[0] = fma(re, b[0], -(im * b[1]));
+    product[1] = fma(re, b[1], im * b[0]);
+}
+
+/* The sum in NumPy's order: in pairs. */
+static void sum_in_pairs(const double *a, int64_t count, double *sum) {
+    double eight[8] = {0};
+    int64_t k = 0;
+    if (count > 64) {
+        const int64_t half = count / 2 - count / 2 % 4;
+        double other[2];
+        sum_in_pairs(a, half, sum);
+        sum_in_pairs(a + 2 * half, count - half, other);
+        sum[0] += other[0], sum[1] += other[1];
+        return;
+    }
+    for (; count >= 4 && k < count - count % 4; k += 4)
+        for (int j = 0; j < 8; ++j) eight[j] += a[2 * k + j];
+    sum[0] = eight[0] + eight[2] + (eight[4] + eight[6]);
+    sum[1] = eight[1] + eight[3] + (eight[5] + eight[7]);
+    for (; k < count; ++k) sum[0] += a[2 * k], sum[1] += a[2 * k + 1];
+}
+
+/* As `drive`, whose rows are those of one stretch; NOT_FINITE where an output is no finite number. */
+EXPORT int drive_turning(void *component, get_set set_real, get_set get_real, do_step step, struct steps *asked,
+                         int64_t *failed, struct turning *run) {
+    double *in = (double *)asked->inputs, *late = (double *)asked->late;
+    for (int64_t first = 0; first < run->count; first += run->each) {
+        const int64_t count = first + run->each < run->count ? run->each : run->count - first;
+        for (int64_t k = 0; k < count; ++k) {
+            run->angle[k] = run->turn + run->rate * run->along[k];
+            run->ahead[2 * k] = cos(run->angle[k]), run->ahead[2 * k + 1] = sin(run->angle[k]);
+            times(run->voltage + 2 * (first + k), run->ahead + 2 * k, in + 2 * k);
+            times(run->late + 2 * (first + k), run->ahead + 2 * k, late + 2 * k);
+        }
+        asked->count = count;
+        const int status = drive(component, set_real, get_real, step, asked, failed);
+        if (status) return status;
+        for (int64_t k = 0; k < count * asked->n_out; ++k)
+            if (!isfinite(asked->outputs[k])) return NOT_FINITE;
+        for (int64_t k = 0; k < count; ++k) {
+            const double *out = asked->outputs + k * asked->n_out;
+            const double own[2] = {out[0] * run->scale, out[1] * run->scale};
+            const double back[2] = {run->ahead[2 * k], -run->ahead[2 * k + 1]};
+            times(own, back, run->current + 2 * (first + k));
+            run->turns[first + k] = run->angle[k] - run->slow;
+        }
+        double sum[2];
+        sum_in_pairs(run->current + 2 * first, count, sum);
+        const double part = 1.0 / (double)count, *measured = run->measured + first / run->each * 2;
+        run->turn = run->angle[count - 1];
+        run->slow += (run->turn - run->slow) * run->along[count - 1] / run->lasts;
+        run->rate = run->gain * (sum[0] * part * measured[1] + sum[1] * part * measured[0]);
+        asked->index += count;
     }
     return 0;
 }

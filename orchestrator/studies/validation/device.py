@@ -19,7 +19,7 @@ from orchestrator.devices.fmi.device_or_controller import NO_BUS, PORT, is_contr
 from orchestrator.devices.fmi.instance import is_ours
 from orchestrator.studies.black_box.bench import Stretches, drive
 from orchestrator.studies.validation.averaging import averaged
-from orchestrator.studies.validation.held_in_step import hold_in_step, steps_held
+from orchestrator.studies.validation.held_in_step import hold_at_once, hold_in_step, steps_held
 from orchestrator.studies.validation.instances import InstanceRun, InstanceShelf
 from orchestrator.studies.validation.over_limit import OverLimit, limit_outputs, over_limit
 from orchestrator.studies.validation.record import Recording
@@ -277,7 +277,11 @@ class PlayedDevice:
         current: Complex = np.conj(recording.power[good] / recording.voltage[good])
         ends: Numbers = np.asarray(self.step_size * np.arange(1, len(held) + 1))
         measured: Complex = np.interp(ends, recording.times[good], current)
-        run = hold_in_step(stretch, (held.mean(axis=1), held[:, -1]), measured, self.step_size)
+        voltage = held.mean(axis=1), held[:, -1]
+        if stretches.turns_at_once:
+            run = hold_at_once(stretches, voltage, measured, self.step_size, scale)
+        else:
+            run = hold_in_step(stretch, voltage, measured, self.step_size)
         return run.current / scale, run.turn
 
     def _outputs(

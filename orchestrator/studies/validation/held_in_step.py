@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers
+from orchestrator.studies.black_box.bench import Stretches, Turning
 
 _GAIN = 2.0
 """Speed of the turn for a whole current that is a radian off [1/s]; from 1 to 4 the right model leaves the least."""
@@ -27,6 +28,9 @@ _INTERVAL = 1e-3
 
 _LASTS = 1.0
 """Time for which a turn counts [s]: an angle that stays is another zero, and moves nothing."""
+
+_AT_ONCE = 20000
+"""Steps in one call of the C library; an interrupt from the keyboard takes effect between two."""
 
 _REACTANCE = 1.0
 """Between the turned voltage and the recorded one, through which a turn counts as power [pu of the rating]."""
@@ -46,6 +50,50 @@ class StepRun:
 def steps_held(step_size: float) -> int:
     """Steps of a device for which the speed of the turn is held."""
     return max(1, round(_INTERVAL / step_size))
+
+
+def hold_at_once(
+    stretches: Stretches,
+    voltage: tuple[Complex, Complex],
+    measured: Complex,
+    step_size: float,
+    scale: float,
+) -> StepRun:
+    """The same as `hold_in_step` to the last bit, in C, for a component that is stepped in this process.
+
+    ``scale``: of its outputs, which makes them a current [pu of the rating]."""
+    each, count = steps_held(step_size), len(measured)
+    held, late = map(np.ascontiguousarray, voltage)
+    means = _means_of_stretches(measured, each)
+    along = step_size * np.arange(1, each + 1)
+    angle, ahead = np.empty(each), np.empty(each, dtype=complex)
+    current, turns = np.empty(count, dtype=complex), np.empty(count)
+    asked = Turning(
+        along=along.ctypes.data,
+        angle=angle.ctypes.data,
+        ahead=ahead.ctypes.data,
+        each=each,
+        gain=_GAIN,
+        lasts=_LASTS,
+        scale=scale,
+    )
+    at_once = max(1, _AT_ONCE // each)  # stretches
+    for first in range(0, count, at_once * each):
+        asked.count = min(at_once * each, count - first)
+        asked.voltage, asked.late = held[first:].ctypes.data, late[first:].ctypes.data
+        asked.measured = means[first // each :].ctypes.data
+        asked.current, asked.turns = current[first:].ctypes.data, turns[first:].ctypes.data
+        stretches.turn(asked)
+    return StepRun(current, turns / _REACTANCE)
+
+
+def _means_of_stretches(values: Complex, each: int) -> Complex:
+    """The conjugates of the means over so many values each; the last one may be over fewer."""
+    whole = len(values) // each * each
+    means = values[:whole].reshape(-1, each).sum(axis=1) / each
+    if whole < len(values):
+        means = np.append(means, values[whole:].sum() / (len(values) - whole))
+    return np.ascontiguousarray(means.conj())
 
 
 def hold_in_step(
