@@ -1,7 +1,6 @@
 """A fault that is planted in the plant and not in its model is named, with its size, from the recording alone."""
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -15,7 +14,7 @@ from orchestrator.studies.validation.parameters import Adjustable
 from orchestrator.studies.validation.questions import QuestionKind
 from orchestrator.studies.validation.words import explanation_sentence, sentence
 from tests.benchmarks.validation_draws import TRUTH
-from tests.studies.validation.recordings import EVENT, run, table, with_noise
+from tests.studies.validation.recordings import phasor_plant, run, table, with_noise
 from tests.support.late import LateLibrary
 
 scipy_signal = LateLibrary("scipy.signal")
@@ -25,16 +24,6 @@ STEP = "500 us"
 
 FINE = "200 us"
 """Where a limit, a lag or the noise decides what is found."""
-
-
-@cache
-def phasor_plant(**values):
-    """What a plant of phasors did, whose POD-P has a gain of 120 by default; an EMT one takes ten times as long."""
-    solver = {"step_size": "100 us", "record_interval": "1 ms", "record_filter": "low-pass"}
-    case = gfor_in_python.load("two_area_rms").with_(events=[EVENT], solver=solver)
-    own = {"pod_p.K": 120.0} | {name.replace("__", "."): value for name, value in values.items()}
-    plant = case.scenario("pod_p", {f"gfor.{name}": value for name, value in own.items()})
-    return table(plant.run(stop=3.0).dataset)
 
 
 def explained(frame, device="gfor", **more):
@@ -166,9 +155,11 @@ def test_a_cause_that_leaves_clearly_more_than_the_first_explains_nothing():
 
 
 def test_a_large_reactance_that_keeps_a_model_from_falling_is_no_cause_of_all():
-    """The plant's axes are limited to 0.95 pu, the model's to 1.1: beside that, the model falls out of step."""
+    """The plant's axes are limited to 0.95 pu, the model's to 1.1: beside that, the model falls out of step.
+
+    It does so within the 1.4 s after the step that are recorded."""
     limits = {f"gfor__voltage_control__i_{axis}_max": 0.95 for axis in "dq"}
-    frame = with_noise(table(run("pod_p", stop=3.0, scale=1.12, **limits))).set_index("time")
+    frame = with_noise(table(run("pod_p", stop=2.4, scale=1.12, **limits))).set_index("time")
     found = gfor_in_python.validate("gfor", frame, values=ON, step="500 us", explain=True).result
     best = found.explanations[0]
     assert found.explained_in_step
@@ -177,8 +168,8 @@ def test_a_large_reactance_that_keeps_a_model_from_falling_is_no_cause_of_all():
 
 
 def test_a_wrong_droop_is_named_though_what_the_samples_do_not_hold_makes_most_of_the_error():
-    """A record of 1 kHz does not hold how the voltage jumps, and the converter rings with it."""
-    frame = with_noise(table(run("pod_p", stop=4.0, gfor__droop__R_f=0.048)))
+    """A record of 1 kHz does not hold how the voltage jumps; the converter rings with it, less than the 2 s here."""
+    frame = with_noise(table(run("pod_p", stop=3.0, gfor__droop__R_f=0.048)))
     best, *_ = explained(frame, values=ON)
     assert (best.cause, best.name, best.now) == (CauseKind.VALUE, "droop.R_f", 0.05)
     assert best.value == pytest.approx(0.048, rel=0.01)
@@ -223,9 +214,11 @@ def test_a_limit_of_the_current_that_the_model_lacks_is_named_with_its_level():
 
 
 def test_a_limit_of_the_current_that_is_too_high_in_the_model_is_named_with_the_plants():
-    """A plant at its limit falls out of step by a thousandth: the level that is read off the record is not enough."""
+    """A plant at its limit falls out of step by a thousandth: the level that is read off the record is not enough.
+
+    It is at its limit from the step on, of which 1.2 s are recorded."""
     limits = {"gfor__current_limit__kind": 1, "gfor__current_limit__I_max": 1.02}
-    frame = with_noise(table(run("pod_p", stop=3.0, scale=1.12, **limits)))
+    frame = with_noise(table(run("pod_p", stop=2.2, scale=1.12, **limits)))
     values = ON | {"current_limit.kind": 1, "current_limit.I_max": 1.2}
     best, *_ = explained(frame, values=values, step=FINE)
     assert (best.cause, best.name, best.now) == (CauseKind.VALUE, "current_limit.I_max", 1.2)

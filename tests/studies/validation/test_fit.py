@@ -16,22 +16,30 @@ from orchestrator.studies.validation.hidden import HiddenVoltage
 from orchestrator.studies.validation.parameters import Adjustable, Wanted
 from orchestrator.studies.validation.view import Validation, parts
 from tests.benchmarks.validation_draws import TRUTH, starts_of
-from tests.studies.validation.recordings import of_pmu, run, table, with_noise, written
+from tests.studies.validation.recordings import (
+    of_pmu,
+    phasor_plant,
+    run,
+    table,
+    with_noise,
+    written,
+)
 
 ON = {"pod_p.enabled": True}
-STEP = "500 us"
-"""Of the device in fits, each of which drives it 10 to 100 times."""
+MODEL, STEP = "gfor_phasor", "1 ms"
+"""Of fits, each of which drives it 10 to 100 times: of phasors, where nothing is fitted that these do not have."""
+
+EMT_STEP = "500 us"
 
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
-    noisy = with_noise(table(run("pod_p", gfor__pod_p__K=120.0)))
-    return written(noisy[noisy.time <= 4.0], tmp_path_factory.mktemp("fit"))
+    return written(with_noise(phasor_plant()), tmp_path_factory.mktemp("fit"))
 
 
 def test_a_gain_is_found_within_its_interval(gfor, recording):
     options = ("--set", "pod_p.enabled=true", "--fit", "pod_p.K", "--step", STEP, "--json")
-    code, out, _ = gfor("validate", "gfor", str(recording), *options)
+    code, out, _ = gfor("validate", MODEL, str(recording), *options)
     assert code == 0
     (found,) = json.loads(out)["fit"]
     assert found["parameter"] == "pod_p.K"
@@ -46,7 +54,7 @@ def test_intervals_beside_an_error_that_stays_do_not_hold(recording, monkeypatch
     """Its droop is wrong, which the fit of a gain cannot mend; other starts find no more."""
     monkeypatch.setattr(fit, "_starts", lambda residuals, told, switches: iter([told]))
     given = {"values": ON | {"droop.R_f": 0.09}, "fit": "pod_p.K", "step": STEP}
-    found = gfor_in_python.validate("gfor", recording, **given)
+    found = gfor_in_python.validate(MODEL, recording, **given)
     assert not found.result.fit.reached
     assert not found.as_json()["fit"][0]["holds"]
     assert "95 %, does not hold" in found.html()
@@ -55,7 +63,7 @@ def test_intervals_beside_an_error_that_stays_do_not_hold(recording, monkeypatch
 @pytest.mark.slow
 def test_what_did_not_run_is_counted_where_something_is_asked_or_searched(recording):
     """A right model of which nothing is asked: another reading that did not run is in JSON alone."""
-    found = gfor_in_python.validate("gfor", recording, values=ON | {"pod_p.K": 120.0})
+    found = gfor_in_python.validate(MODEL, recording, values=ON | {"pod_p.K": 120.0})
     result = found.result
     result.request.device.trials.note(
         "P and Q of one phase", gfor_in_python.CosimError("too large")
@@ -69,7 +77,7 @@ def test_what_did_not_run_is_counted_where_something_is_asked_or_searched(record
 
 def test_a_switched_off_controller_is_seen_and_its_gain_with_it(recording):
     wanted = "pod_p.enabled, pod_p.K"
-    found = gfor_in_python.validate("gfor", recording, fit=wanted, step=STEP).fitted()
+    found = gfor_in_python.validate(MODEL, recording, fit=wanted, step=STEP).fitted()
     by_name = found.set_index("parameter")
     assert bool(by_name.loc["pod_p.enabled", "value"]) is True
     assert by_name.loc["pod_p.K", "value"] == pytest.approx(120, rel=0.05)
@@ -77,7 +85,7 @@ def test_a_switched_off_controller_is_seen_and_its_gain_with_it(recording):
 
 def test_what_moves_nothing_is_named_before_the_fit_and_left(recording):
     given = {"values": ON, "fit": "pod_q.K, pod_p.K", "step": STEP}
-    found = gfor_in_python.validate("gfor", recording, **given).fitted()
+    found = gfor_in_python.validate(MODEL, recording, **given).fitted()
     by_name = found.set_index("parameter")
     assert not by_name.loc["pod_q.K", "identifiable"]
     assert by_name.loc["pod_q.K", "why_not"] == "no effect"
@@ -92,16 +100,16 @@ def test_names_and_bounds_that_do_not_fit_are_refused_before_anything_is_driven(
     assert code == 2
     assert "pod_p.K" in err
     options = ("--fit", "pod_p.K", "--bounds", "pod_p.K=-5:10")
-    code, _, err = gfor("validate", "gfor", str(recording), *options)
+    code, _, err = gfor("validate", MODEL, str(recording), *options)
     assert code == 2
     assert "0 to 100000" in err.replace("1e+05", "100000")
 
 
 def test_three_parameters_are_found_from_a_start_at_which_the_ringing_is_out_of_phase():
-    frame = with_noise(table(run("pod_p", gfor__pod_p__K=120.0)), 0).set_index("time")
+    frame = with_noise(table(run("pod_p", stop=4.5, gfor__pod_p__K=120.0)), 0).set_index("time")
     names = list(TRUTH)[:3]
     values = ON | starts_of(0, names)
-    found = gfor_in_python.validate("gfor", frame, values=values, fit=names, step=STEP)
+    found = gfor_in_python.validate("gfor", frame, values=values, fit=names, step=EMT_STEP)
     assert found.result.fit.reached
     for row in found.fitted().itertuples():
         assert row.low < TRUTH[row.parameter] < row.high
@@ -109,12 +117,12 @@ def test_three_parameters_are_found_from_a_start_at_which_the_ringing_is_out_of_
 
 
 def test_an_event_that_is_kept_back_confirms_the_fit(gfor, recording, tmp_path):
-    other = with_noise(table(run("pod_p", scale=0.95, gfor__pod_p__K=120.0)), 2)
+    other = with_noise(phasor_plant(scale=0.95), 2)
     kept = written(other, tmp_path, "other.csv")
     options = ("--set", "pod_p.enabled=true", "--set", "pod_p.K=60", "--fit", "pod_p.K")
     options += ("--step", STEP)
     code, out, _ = gfor(
-        "validate", "gfor", str(recording), *options, "--hold-back", str(kept), "--json"
+        "validate", MODEL, str(recording), *options, "--hold-back", str(kept), "--json"
     )
     assert code == 0
     fitted, held = json.loads(out)["fit_events"]
@@ -133,7 +141,7 @@ def test_an_interrupted_fit_keeps_the_best_values_so_far(recording):
             raise KeyboardInterrupt
 
     given = {"values": ON | {"pod_p.K": 60.0}, "fit": "pod_p.K", "step": STEP}
-    found = gfor_in_python.validate("gfor", recording, report=report, **given)
+    found = gfor_in_python.validate(MODEL, recording, report=report, **given)
     content = found.as_json()
     assert content["fit_finished"] is False
     (one,) = content["fit"]
@@ -152,7 +160,7 @@ def test_the_command_ends_an_interrupted_fit_with_its_figures(gfor, recording, m
 
     monkeypatch.setattr(fit, "_least_squares", stopped)
     options = ("--set", "pod_p.enabled=true", "--fit", "pod_p.K", "--step", STEP, "--json")
-    code, out, _ = gfor("validate", "gfor", str(recording), *options)
+    code, out, _ = gfor("validate", MODEL, str(recording), *options)
     assert code == INTERRUPTED
     assert json.loads(out)["fit"][0]["value"] == 100
 
@@ -291,7 +299,7 @@ def limited():
 def fit_of_limit(frame, **wrong):
     """The fit of a limit of 1.1 pu, in a model of which other values may be wrong."""
     values = {"current_limit.kind": 3, "current_limit.I_max": 1.1} | wrong
-    given = {"values": ON | values, "fit": "current_limit.I_max", "step": STEP}
+    given = {"values": ON | values, "fit": "current_limit.I_max", "step": EMT_STEP}
     return gfor_in_python.validate("gfor", frame.set_index("time"), **given).result.fit
 
 
