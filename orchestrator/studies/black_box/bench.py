@@ -258,7 +258,7 @@ def drive(
 
 
 class Turning(ctypes.Structure):
-    """What ``drive_turning`` of drive.c is given, and where it stands."""
+    """The arguments of ``drive_turning`` in drive.c, and where it stands."""
 
     _fields_ = (
         ("voltage", ctypes.c_void_p),
@@ -352,7 +352,7 @@ def _make(component: Component, steps: Steps, outputs: Numbers) -> None:
 
 
 def _functions(component: Component) -> list[ctypes.c_void_p]:
-    """What the C library calls of a component."""
+    """The functions of a component that the C library calls."""
     each = (component.set_real, component.get_real, component.do_step)
     return [ctypes.cast(one, ctypes.c_void_p) for one in each]
 

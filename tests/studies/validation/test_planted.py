@@ -282,7 +282,7 @@ OF_FLUXES = {
     "the angle is behind a lag of 20 ms",
     "the angle is of a filtered frequency",
 }
-"""What shows beside a model with fluxes, as the plant has them: it is told by how the first 20 ms after a jump go."""
+"""Rows that take a model with fluxes, as the plant has: they are told by how the first 20 ms after a jump go."""
 
 
 @pytest.mark.parametrize("name", PLANTED)
