@@ -70,15 +70,20 @@ def movers(
     ).result
     least = _NO_EFFECT * abs(found.mode.eigenvalue)
     acting = [row for row in found.rows if row.derivative is not None and row.effect > least]
-    trusted = sorted(acting, key=lambda row: (bool(row.doubts), -row.effect))
+    trusted = sorted(acting, key=lambda row: (bool(row.doubts), -_rounded(row.effect)))
     shown = [_as_json(row) for row in trusted[:MOST]]
     return {
-        "movers": sorted(shown, key=lambda one: (bool(one["doubts"]), -abs(one["points"]))),
+        "movers": sorted(shown, key=lambda one: (bool(one["doubts"]), -_rounded(one["points"]))),
         "frequency_hz": found.mode.frequency_hz,
         "damping_percent": found.mode.damping_percent,
         "looked_at": len(wanted),
         "of": len(of),
     }
+
+
+def _rounded(x: float) -> float:
+    """The size of a figure in the digits that its error leaves: two alike are not ordered by chance."""
+    return float(f"{abs(x):.3g}")
 
 
 def candidates(scenario: Scenario, shares: Mapping[str, float]) -> tuple[list[str], list[str]]:

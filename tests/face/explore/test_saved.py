@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from orchestrator.core.errors import InputError
+from orchestrator.core.errors import CaseError, InputError, Problem
 from orchestrator.face.explore import saved
 from orchestrator.face.explore.interpolation import judged_cell
 from orchestrator.face.explore.smaller import smaller_answer, smaller_parameters
@@ -31,6 +31,31 @@ def answer_of(*eigenvalues):
         for one in eigenvalues
     ]
     return {"modes": {"scenarios": [{"modes": modes}]}, "scenarios": {"base": {}}}
+
+
+@pytest.mark.parametrize(
+    ("most", "bound", "said"),
+    [
+        (1.6, 10.0, {"above": "power flow: no solution found"}),
+        (9.0, 3.0, {"above": "the declared bound"}),
+        (9.0, 10.0, {}),
+    ],
+)
+def test_why_a_slider_goes_no_further_is_kept(most, bound, said):
+    """Its range ended somewhere, without a word."""
+
+    def computed(point):
+        if point["grid.load.scale"] > most:
+            problem = Problem.of_scenario(
+                "power_flow", "base", "power flow: no solution found. Lower it"
+            )
+            raise CaseError("case.toml", [problem])
+        return {}
+
+    mover = {"parameter": "grid.load.scale", "value": 1.0, "minimum": 0.0, "maximum": bound}
+    values, why = saved._reached_values(mover, 12, computed)
+    assert why == said
+    assert max(values) <= min(most, bound)
 
 
 def test_each_point_of_the_grid_is_asked_and_counted_once(monkeypatch, tmp_path):
