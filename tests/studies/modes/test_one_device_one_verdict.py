@@ -79,9 +79,11 @@ def test_another_frequency_is_found_alike_and_nothing_slips(typed):
         ({"i_max": 0.4}, None, "above its current limit"),
     ],
 )
-def test_sign_and_limit_are_found_alike(typed, bound, check, fault):
+def test_sign_and_limit_are_found_alike(typed, bound, check, fault, request):
     if check:
         assert checked(typed, check, **bound)[check]["fault"] == fault
+    else:
+        request.getfixturevalue("in_process")
     said = typed("run", "case.toml", "--out", "r", **bound)[2]
     assert f"gfor: {fault}: " in said
     assert REMEDIES[fault] in said

@@ -46,6 +46,7 @@ def run(gfor, case, *further, stop="3"):
         stop,
         "--json",
         "--fail-unstable",
+        "--no-csv",
         "--out",
         case.parent / "r",
     )

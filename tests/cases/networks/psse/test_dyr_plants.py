@@ -133,7 +133,9 @@ def test_the_voltage_that_is_measured_is_the_one_that_is_held(prepared, tmp_path
     event = '{ type = "load_change", time = "0.1 s", load = "load_8", scale = 1.1 }'
     case = (tmp_path / "case.toml").read_text() + f"events = [{event}]\n"
     (tmp_path / "case.toml").write_text(case)
-    code, _, error = gfor("run", tmp_path / "case.toml", "--stop", "4", "--out", tmp_path / "out")
+    code, _, error = gfor(
+        "run", tmp_path / "case.toml", "--no-csv", "--stop", "4", "--out", tmp_path / "out"
+    )
     assert code == 0, error
     (file,) = (tmp_path / "out").rglob("*.nc")
     with xr.open_dataset(file) as data:
@@ -360,7 +362,9 @@ def test_the_system_with_such_a_plant_has_modes_and_a_run(records, prepared, tmp
     event = '{ type = "load_change", time = "0.1 s", load = "load_8", scale = 1.05 }'
     case = (tmp_path / "case.toml").read_text() + f"events = [{event}]\n"
     (tmp_path / "case.toml").write_text(case)
-    code, _, error = gfor("run", tmp_path / "case.toml", "--stop", "1", "--out", tmp_path / "out")
+    code, _, error = gfor(
+        "run", tmp_path / "case.toml", "--no-csv", "--stop", "1", "--out", tmp_path / "out"
+    )
     assert code == 0, error
 
 
@@ -461,7 +465,7 @@ def test_small_photovoltaic_plants_are_the_whole_unit(prepared, tmp_path, gfor):
     code, _, error = gfor("modes", tmp_path / "case.toml", "--json")
     assert code == 0, error
     words = ("--fault", "bus_9, 100 ms", "--stop", "2", "--out", tmp_path / "out")
-    code, _, error = gfor("run", tmp_path / "case.toml", *words)
+    code, _, error = gfor("run", tmp_path / "case.toml", "--no-csv", *words)
     assert code == 0, error
     (path,) = (tmp_path / "out").rglob("*.nc")
     with xr.open_dataset(path) as kept:

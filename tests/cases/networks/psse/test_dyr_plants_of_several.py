@@ -177,7 +177,9 @@ def test_the_voltage_of_the_plant_returns_and_its_power_is_shared(prepared, tmp_
     event = '{ type = "load_change", time = "0.1 s", load = "load_8", scale = 1.1 }'
     case = (tmp_path / "case.toml").read_text() + f"events = [{event}]\n"
     (tmp_path / "case.toml").write_text(case)
-    code, _, error = gfor("run", tmp_path / "case.toml", "--stop", "5", "--out", tmp_path / "out")
+    code, _, error = gfor(
+        "run", tmp_path / "case.toml", "--no-csv", "--stop", "5", "--out", tmp_path / "out"
+    )
     assert code == 0, error
     (file,) = (tmp_path / "out").rglob("*.nc")
     with xr.open_dataset(file) as data:
