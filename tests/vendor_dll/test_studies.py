@@ -12,6 +12,8 @@ from orchestrator.studies.modes.modes import compute_modes
 from tests.support.vendor_dlls import droop_device
 from tests.vendor_dll.test_device import swing
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 CASE = """
 name = "one"
 [solver]
