@@ -140,7 +140,6 @@ def compile_for(source: str, target: str, ending: str, libraries: Sequence[str] 
     ``ending``: Of the library's file, such as ``.so``; ``.exe`` makes a program.
     ``libraries``: Of the system, that the source needs beside the C library and its mathematics, such as ``dl``."""
     require("compiling C", "ziglang")
-    flags = _flags(target, ending)
     own = _WASM_FLAGS if target == WASM else ()
     parts = [source, target, *recipe(), *own, *libraries]
     library = cache_directory("libraries") / f"{key_of(*parts)}{ending}"
@@ -149,25 +148,47 @@ def compile_for(source: str, target: str, ending: str, libraries: Sequence[str] 
     sweep_partial_files(cache_directory("libraries").parent)
     folder = own_folder("compile")
     try:
-        c_file, built = folder / "source.c", folder / f"library{ending}"
-        c_file.write_text(source, encoding="utf-8")
-        command = [
-            *(str(_zig()), "cc", "-target", target),
-            *flags,
-            str(c_file),
-            "-o",
-            str(built),
-            "-lm",
-            *(f"-l{name}" for name in libraries),
-        ]
-        result = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
-        if result.returncode:
-            raise RuntimeError(
-                f"the C compiler (ziglang) failed for {target}:\n{result.stderr.strip()}"
+        (folder / _SOURCE).write_text(source, encoding="utf-8")
+        built = folder / f"library{ending}"
+        for command in _commands(target, ending, libraries, built):
+            result = subprocess.run(
+                [str(_zig()), *command], capture_output=True, text=True, check=False, cwd=folder
             )
-        return keep(library, built.read_bytes())
+            if result.returncode == 0:
+                return keep(library, built.read_bytes())
+        raise RuntimeError(
+            f"the C compiler (ziglang) failed for {target}:\n{result.stderr.strip()}"
+        )
     finally:
         remove(folder)
+
+
+_SOURCE = "source.c"  # what messages of the compiler name
+
+_WITHOUT_RUNTIME = (
+    *("-fno-compiler-rt", "-z", "defs"),  # a call of the runtime library is an error at once
+    *("-fno-soname", "-O", "ReleaseFast", "-fstrip"),  # as `zig cc` has it for `FLAGS`
+)
+
+
+def _commands(target: str, ending: str, libraries: Sequence[str], built: Path) -> list[list[str]]:
+    """Return arguments of zig, to be tried one after the other; each that succeeds writes the same bytes.
+
+    Of a library for Linux, zig first makes it without its own runtime library, which it compiles once in each new
+    environment, for 4 s of processor, and which our code calls nothing of. Code that does is compiled as all other."""
+    linked = ["-lm", *(f"-l{name}" for name in libraries)]
+    flags = _flags(target, ending)
+    driver = ["cc", "-target", target, *flags, _SOURCE, "-o", str(built), *linked]
+    if ending != ENDINGS["linux64"]:
+        return [driver]
+    own = [flag for flag in flags if flag != "-shared"]
+    return [
+        [
+            *("build-lib", "-dynamic", "-target", target, *_WITHOUT_RUNTIME),
+            *("-lc", *linked, f"-femit-bin={built}", "-cflags", *own, "--", _SOURCE),
+        ],
+        driver,
+    ]
 
 
 @cache

@@ -3,13 +3,14 @@
 import contextlib
 import ctypes
 import math
+import subprocess
 
 import casadi as ca
 import numpy as np
 import pytest
 
 from fmus.toolchain import symbols
-from fmus.toolchain.compiler import compile_library, host_platform
+from fmus.toolchain.compiler import TARGETS, _commands, _zig, compile_library, host_platform
 from fmus.toolchain.kernel import c_source
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.tape import tape_of
@@ -325,6 +326,38 @@ def test_an_unknown_platform_is_refused_with_those_there_are():
 def test_a_failing_compiler_is_quoted():
     with pytest.raises(RuntimeError, match=r"(?s)ziglang\) failed for .*source\.c.*error"):
         compile_library("this is not C", host_platform())
+
+
+NEEDS_A_RUNTIME = """
+__attribute__((visibility("default"))) double third(double a) { return (double)((__int128)a / 3); }
+"""
+NEEDS_NONE = """
+#include <math.h>
+#include <stdio.h>
+__attribute__((visibility("default"))) double third(double a) { return printf("") + fmod(a, 10) / 3; }
+"""
+
+
+@pytest.mark.parametrize(
+    ("source", "succeed"), [(NEEDS_NONE, [True, True]), (NEEDS_A_RUNTIME, [False, True])]
+)
+def test_a_library_for_linux_is_the_same_without_zigs_own_runtime_or_has_it(
+    source, succeed, tmp_path
+):
+    """zig compiles its runtime library anew in each new environment."""
+    (tmp_path / "source.c").write_text(source, encoding="utf-8")
+    built = tmp_path / "built.so"
+    made = []
+    for command in _commands(TARGETS["linux64"][0], ".so", (), built):
+        done = subprocess.run([_zig(), *command], cwd=tmp_path, capture_output=True, check=False)
+        made.append(built.read_bytes() if done.returncode == 0 else None)
+    assert [content is not None for content in made] == succeed
+    kept = compile_library(source, "linux64")
+    assert {content for content in made if content} == {kept.read_bytes()}
+    if host_platform() == "linux64":
+        third = ctypes.CDLL(str(kept)).third
+        third.argtypes, third.restype = [ctypes.c_double], ctypes.c_double
+        assert third(9.0) == 3.0
 
 
 # -- errors of the builder ---------------------------------------------------------------------
