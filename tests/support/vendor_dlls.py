@@ -1,15 +1,10 @@
 """Controllers as IEEE/CIGRE DLLs, written for the tests: sound ones and ones with a planted fault."""
 
-import subprocess
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from fmus.toolchain.cache import cache_directory, intact, keep, key_of
-from fmus.toolchain.compiler import ENDINGS, FLAGS, TARGETS, _zig, recipe
-
-OWN_LIBRARY = {"win64": [flag for flag in FLAGS if flag != "-fvisibility=hidden"]}
-"""By other flags than the project's own the compiler would build its C library once more, in a minute."""
+from fmus.toolchain.compiler import ENDINGS, TARGETS, compile_for
 
 INTERFACE = """
 #include <stdint.h>
@@ -67,18 +62,17 @@ def lag(
     return INTERFACE + LAG + info + head + body
 
 
+EXPORTED = "#pragma GCC visibility push(default)\n"
+"""A vendor's library exports all of its functions; ours hide what is not marked."""
+
+
 def compiled(source, folder, name="controller", platform="linux64"):
-    """The library of a source that includes the system's headers alone, in a folder; kept in the cache of libraries."""
-    text, library = folder / f"{name}.c", folder / f"{name}{ENDINGS[platform]}"
-    text.write_text(source, encoding="utf-8")
-    target = () if platform == "linux64" else ("-target", TARGETS[platform][0])
-    flags = ("-O1", "-shared", "-fPIC", "-g0", "-ffp-contract=off", *OWN_LIBRARY.get(platform, ()))
-    key = key_of(source, name, *target, *flags, *recipe())
-    kept = cache_directory("libraries") / f"{key}{ENDINGS[platform]}"
-    if not intact(kept):
-        command = [_zig(), "cc", *target, *flags, text, "-o", library, "-lm"]
-        subprocess.run(command, check=True, capture_output=True, cwd=folder)
-        keep(kept, library.read_bytes())
+    """The library of a source that includes the system's headers alone, in a folder; kept in the cache of libraries.
+
+    With a library's flags: by others zig would build its C and runtime libraries once more, in a minute.
+    """
+    library = folder / f"{name}{ENDINGS[platform]}"
+    kept = compile_for(EXPORTED + source, TARGETS[platform][0], ENDINGS[platform])
     library.write_bytes(kept.read_bytes())
     return library
 
