@@ -12,7 +12,7 @@ import pytest
 
 import orchestrator as gfor
 from fmus.toolchain.catalogue import build_model
-from fmus.toolchain.component import MANIFEST, PLATFORM, STANDARD
+from fmus.toolchain.component import MANIFEST, PLATFORM, STANDARD, manifest
 from fmus.toolchain.exporter import export
 from fmus.toolchain.extras import SetupError
 from fmus.toolchain.native_fmu import NativeFmu
@@ -29,6 +29,9 @@ STEPS, JUMP_AT, JUMP = 2000, 500, math.radians(-10.0)
 SAME = 1e-12  # [pu], over 2000 steps of the same code by another compiler; 1e-14 was seen
 ROOM = 17_500_000  # bytes that the component may take: 16 MiB are its stack
 LEAKS = 250  # calls that fill the rest if one of them leaves 3 kB behind
+
+compiles = pytest.mark.slow
+"""Of a test that needs a component: a new environment compiles a C library for WebAssembly, for 20 s of processor."""
 
 
 @cache
@@ -111,6 +114,7 @@ def native(files, tmp_path_factory):
     return opened
 
 
+@compiles
 @pytest.mark.parametrize("name", ["gfor", "two_area_grid"])
 def test_it_steps_as_the_native_fmu_does(web, native, name):
     one, other = web(name).initialise(), native(name).initialise()
@@ -140,6 +144,7 @@ def test_it_steps_as_the_native_fmu_does(web, native, name):
     assert furthest < SAME
 
 
+@compiles
 def test_two_instances_of_one_component_do_not_meet(files):
     one = Web(files["gfor"]).initialise()
     before = one.get("p", "q", "omega")
@@ -156,6 +161,7 @@ def test_two_instances_of_one_component_do_not_meet(files):
     other.drop(one.store)
 
 
+@compiles
 def test_a_state_comes_back(web):
     one = web().initialise()
     one.do("do-step", 0.0, H, True)
@@ -169,6 +175,7 @@ def test_a_state_comes_back(web):
     assert "bytes" in one.log[-1][-1]
 
 
+@compiles
 def test_derivatives_are_the_native_ones(web, native):
     one, other = web().initialise(), native().initialise()
     inputs, outputs = other.role("input"), other.role("output")
@@ -184,6 +191,7 @@ def test_derivatives_are_the_native_ones(web, native):
     )
 
 
+@compiles
 def test_values_of_each_kind_are_set_and_read(web):
     one = web()
     of = {v.type: v for v in one.md.modelVariables if v.causality == "parameter"}
@@ -228,6 +236,7 @@ ABSENT = [
 ]
 
 
+@compiles
 @pytest.mark.parametrize(
     ("name", "given"), ABSENT, ids=[f"{n}-{k}" for k, (n, _) in enumerate(ABSENT)]
 )
@@ -248,6 +257,7 @@ def shared(files):
     return Web(files["gfor"])
 
 
+@compiles
 @pytest.mark.parametrize("more", [{"token": "{another}"}, {"event_mode": True}])
 def test_there_is_no_instance_of_another_token_or_with_events(web, more):
     one = web(**more)
@@ -255,6 +265,7 @@ def test_there_is_no_instance_of_another_token_or_with_events(web, more):
     assert one.log[-1][:2] == ("one", "error")
 
 
+@compiles
 def test_calls_leave_no_memory_behind(files):
     one = Web(files["gfor"], room=ROOM).initialise()
     kept = one.do("get-fmu-state")
@@ -272,18 +283,24 @@ def test_calls_leave_no_memory_behind(files):
         assert one.do("set-fmu-state", kept) == "ok"
 
 
+@compiles
 def test_the_archive_is_as_the_draft_says(files):
     with zipfile.ZipFile(files["gfor"]) as archive:
-        root = ElementTree.fromstring(archive.read(MANIFEST))
+        assert archive.read(MANIFEST) == manifest()
         names = archive.namelist()
-    attributes = {key.rpartition("}")[2]: value for key, value in root.attrib.items()}
-    assert attributes["fmi-ls-name"] == STANDARD
-    assert re.fullmatch(r"\d+\.\d+\.\d+", attributes["fmi-ls-version"])
-    assert attributes["fmi-ls-description"] == "FMI Layered Standard for WebAssembly"
     assert f"binaries/{PLATFORM}/gfor.wasm" in names
     assert read_declared(files["gfor"]).platforms == ("linux64", PLATFORM)
 
 
+def test_the_manifest_is_as_the_draft_says():
+    root = ElementTree.fromstring(manifest())
+    attributes = {key.rpartition("}")[2]: value for key, value in root.attrib.items()}
+    assert attributes["fmi-ls-name"] == STANDARD
+    assert re.fullmatch(r"\d+\.\d+\.\d+", attributes["fmi-ls-version"])
+    assert attributes["fmi-ls-description"] == "FMI Layered Standard for WebAssembly"
+
+
+@compiles
 def test_it_asks_nothing_of_its_host_but_a_place_for_messages(files):
     with zipfile.ZipFile(files["gfor"]) as archive:
         code = archive.read(f"binaries/{PLATFORM}/gfor.wasm")
@@ -297,6 +314,10 @@ def test_only_a_native_fmu_of_fmi_3_has_one(tmp_path):
         gfor.build("infinite_bus", tmp_path, platforms=[PLATFORM])
     with pytest.raises(InputError, match=r"fmi='3\.0'"):
         gfor.build("infinite_bus", tmp_path, native=True, platforms=[PLATFORM])
+
+
+@compiles
+def test_an_fmu_may_have_a_component_alone(tmp_path):
     built = gfor.build("infinite_bus", tmp_path, native=True, fmi="3.0", platforms=[PLATFORM])
     assert read_declared(built).platforms == (PLATFORM,)
 
