@@ -70,8 +70,9 @@ def movers(
     ).result
     least = _NO_EFFECT * abs(found.mode.eigenvalue)
     acting = [row for row in found.rows if row.derivative is not None and row.effect > least]
-    trusted = sorted(acting, key=lambda row: (bool(row.doubts), -_rounded(row.effect)))
-    shown = [_as_json(row) for row in trusted[:MOST]]
+    by_name = sorted(acting, key=lambda row: row.parameter.name)  # which ends what is alike
+    trusted = sorted(by_name, key=lambda row: (bool(row.doubts), -_rounded(row.effect)))
+    shown = [_as_json(row) for row in sorted(trusted[:MOST], key=lambda row: row.parameter.name)]
     return {
         "movers": sorted(shown, key=lambda one: (bool(one["doubts"]), -_rounded(one["points"]))),
         "frequency_hz": found.mode.frequency_hz,

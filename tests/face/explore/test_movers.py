@@ -47,6 +47,14 @@ def test_the_value_whose_step_moves_damping_most_comes_first():
     assert abs(found[0]["hertz"]) < abs(found[1]["hertz"])
 
 
+def test_the_halves_of_a_tie_stand_in_the_order_of_their_names():
+    """They move a mode alike, and rounding once chose which came first."""
+    halves = [f"grid.X_tie_8_9_{k}" for k in (1, 2)]
+    scenario = gfor.load("kundur").scenario("pod_q")
+    found = movers(scenario, {}, RANGE, halves[::-1], lambda part: None)["movers"]
+    assert [one["parameter"] for one in found] == halves
+
+
 def test_what_is_off_or_zero_moves_nothing_and_is_not_looked_at():
     looked_at, of = candidates(gfor.load("two_area").scenario("gfor"), {})
     assert looked_at == of
