@@ -11,6 +11,7 @@ import logging
 import posixpath
 import re
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 from mkdocs.config.defaults import MkDocsConfig
@@ -117,6 +118,7 @@ def _link(found: re.Match[str], name: str, site: str) -> str:
     return text if wanted in text or Path(wanted).name in text else f"{text} (`{wanted}`)"
 
 
+@cache
 def commands() -> str:
     """The reference of all commands, from their argument parsers."""
     from orchestrator.face.cli import COMMANDS  # noqa: PLC0415 - only the page of commands needs the package
@@ -157,6 +159,7 @@ def _as_typed(found: re.Match[str]) -> str:
     )
 
 
+@cache
 def studies() -> str:
     """What is made from the requests of studies; mkdocstrings reads files, and sees none."""
     from orchestrator.face.api.case import Case  # noqa: PLC0415 - as above
