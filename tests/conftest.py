@@ -25,6 +25,7 @@ from tests.support.bytecode import TESTS, import_share, keep
 from tests.support.durations import MEASURED, Measure, longest_first, mark
 from tests.support.reports import FewReports, asks_for_seconds
 from tests.support.skips import Skips, in_ci
+from tests.support.undrawn import write_empty
 
 
 def pytest_configure(config):
@@ -105,12 +106,8 @@ def undrawn():
     For modules whose subject is another one; `tests/studies/runs/test_signal_plots.py` and others look at pictures.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("matplotlib.figure.Figure.savefig", _write_empty)
+        patch.setattr("matplotlib.figure.Figure.savefig", write_empty)
         yield
-
-
-def _write_empty(figure, file, **how):
-    file.write(b"\x89PNG")
 
 
 @pytest.fixture

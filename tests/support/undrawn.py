@@ -14,3 +14,8 @@ UNDRAWN = (sys.executable, "-c", _WITHOUT_PICTURES)
 
 DRAWN = (sys.executable, "-m", "orchestrator.face.cli")
 """The same for one that draws."""
+
+
+def write_empty(figure, file, **how):
+    """In the place of `Figure.savefig`."""
+    file.write(b"\x89PNG")

@@ -54,12 +54,15 @@ def case(tmp_path_factory):
     return write_case(tmp_path_factory.mktemp("case") / "events.toml")
 
 
-def started(tmp, *words, drawn=False):
-    call = [*(DRAWN if drawn else UNDRAWN), "run", *map(str, words)]
+def started(tmp, *words, drawn=False, warm=None):
+    """From its very beginning; if ``warm`` is given, with its imports behind it."""
     tmp.mkdir(parents=True, exist_ok=True)
+    env = os.environ | {"TMPDIR": str(tmp)}
+    if warm:
+        return warm.started("run", *words, env=env, drawn=drawn)
     return subprocess.Popen(
-        call,
-        env=os.environ | {"TMPDIR": str(tmp)},
+        [*(DRAWN if drawn else UNDRAWN), "run", *map(str, words)],
+        env=env,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -67,8 +70,8 @@ def started(tmp, *words, drawn=False):
     )
 
 
-def finished(tmp, *words, drawn=False):
-    process = started(tmp, *words, drawn=drawn)
+def finished(tmp, *words, drawn=False, warm=None):
+    process = started(tmp, *words, drawn=drawn, warm=warm)
     _, error = process.communicate(timeout=300)
     assert process.returncode == 0, error
     return error
@@ -112,10 +115,10 @@ WORDS = ("--scenario", "gfor", "--scenario", "pod_pq")
 
 
 @pytest.fixture(scope="module")
-def undisturbed(case, tmp_path_factory):
+def undisturbed(case, warm, tmp_path_factory):
     folder = tmp_path_factory.mktemp("undisturbed")
     begun = time.monotonic()
-    finished(folder / "tmp", case, *WORDS, "--out", folder / "out", drawn=True)
+    finished(folder / "tmp", case, *WORDS, "--out", folder / "out", drawn=True, warm=warm)
     return folder / "out", time.monotonic() - begun
 
 
@@ -136,11 +139,11 @@ def stopped_at_random(process, folder, longest, number):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("attempt", range(5))
-def test_a_killed_run_goes_on_to_the_last_bit(case, undisturbed, tmp_path, attempt):
-    """The first attempt has pictures."""
+def test_a_killed_run_goes_on_to_the_last_bit(case, undisturbed, warm, tmp_path, attempt):
+    """The first attempt has pictures. What goes on is a process from its very beginning."""
     out, drawn = tmp_path / "out", attempt == 0
     words = (case, *WORDS, "--out", out, "--checkpoint", "0.05")
-    process = started(tmp_path / "tmp", *words, drawn=drawn)
+    process = started(tmp_path / "tmp", *words, drawn=drawn, warm=warm)
     stopped_at_random(process, out, undisturbed[1], signal.SIGKILL)
     if process.returncode == -signal.SIGKILL and (out / ".checkpoints").exists():
         finished(tmp_path / "tmp", "--resume", out, drawn=drawn)
@@ -150,7 +153,10 @@ def test_a_killed_run_goes_on_to_the_last_bit(case, undisturbed, tmp_path, attem
 
 @pytest.mark.slow
 @pytest.mark.parametrize("attempt", range(3))
-def test_sigterm_leaves_nothing_behind_and_the_run_goes_on(case, undisturbed, tmp_path, attempt):
+def test_sigterm_leaves_nothing_behind_and_the_run_goes_on(
+    case, undisturbed, warm, tmp_path, attempt
+):
+    """What is ended is a process from its very beginning."""
     out = tmp_path / "out"
     process = started(tmp_path / "tmp", case, *WORDS, "--out", out, "--checkpoint", "0.05")
     _, error = stopped_at_random(process, out, undisturbed[1], signal.SIGTERM)
@@ -160,38 +166,40 @@ def test_sigterm_leaves_nothing_behind_and_the_run_goes_on(case, undisturbed, tm
     if process.returncode != 0:
         assert process.returncode == 143, error
         assert "ended by SIGTERM" in error
-        finished(tmp_path / "tmp", "--resume", out)
+        finished(tmp_path / "tmp", "--resume", out, warm=warm)
     assert values_of(out) == values_of(undisturbed[0])
 
 
 @pytest.mark.slow
-def test_a_killed_run_on_several_threads_goes_on_with_another_number_of_them(case, tmp_path):
+def test_a_killed_run_on_several_threads_goes_on_with_another_number_of_them(case, warm, tmp_path):
     words = (case, "--native", "--scenario", "pod_pq", "--threads")
-    finished(tmp_path / "tmp", *words, 1, "--out", tmp_path / "whole")
+    finished(tmp_path / "tmp", *words, 1, "--out", tmp_path / "whole", warm=warm)
     out = tmp_path / "out"
-    process = started(tmp_path / "tmp", *words, 3, "--out", out, "--checkpoint", "0.01")
+    process = started(tmp_path / "tmp", *words, 3, "--out", out, "--checkpoint", "0.01", warm=warm)
     stopped_at_random(process, out, 0.1, signal.SIGKILL)
     assert process.returncode == -signal.SIGKILL
-    assert "it goes on from t = " in finished(tmp_path / "tmp", "--resume", out, "--threads", 2)
+    assert "it goes on from t = " in finished(
+        tmp_path / "tmp", "--resume", out, "--threads", 2, warm=warm
+    )
     assert values_of(out) == values_of(tmp_path / "whole")
 
 
 @pytest.mark.slow
-def test_a_run_killed_before_its_first_checkpoint_says_that_it_begins_anew(tmp_path):
+def test_a_run_killed_before_its_first_checkpoint_says_that_it_begins_anew(warm, tmp_path):
     words, out = ("infinite_bus", "--scenario", "dip"), tmp_path / "out"
-    process = started(tmp_path / "tmp", *words, "--out", out, "--checkpoint", "600")
+    process = started(tmp_path / "tmp", *words, "--out", out, "--checkpoint", "600", warm=warm)
     while not (out / ".checkpoints" / "request.json").exists() and process.poll() is None:
         time.sleep(0.001)
     process.kill()
     process.communicate(timeout=120)
-    error = finished(tmp_path / "tmp", "--resume", out)
+    error = finished(tmp_path / "tmp", "--resume", out, warm=warm)
     assert "scenario 'dip': nothing of it was kept, so it begins at t = 0" in error
-    finished(tmp_path / "tmp", *words, "--out", tmp_path / "whole")
+    finished(tmp_path / "tmp", *words, "--out", tmp_path / "whole", warm=warm)
     assert values_of(out) == values_of(tmp_path / "whole")
 
 
 @pytest.mark.slow
-def test_an_isolated_fmu_goes_on_in_a_new_process(case, tmp_path):
+def test_an_isolated_fmu_goes_on_in_a_new_process(case, warm, tmp_path):
     text = case.read_text(encoding="utf-8")
     own = tmp_path / "isolated.toml"
     own.write_text(
@@ -199,16 +207,24 @@ def test_an_isolated_fmu_goes_on_in_a_new_process(case, tmp_path):
         encoding="utf-8",
     )
     assert own.read_text(encoding="utf-8") != text
-    finished(tmp_path / "tmp", own, "--scenario", "pod_p", "--out", tmp_path / "whole")
+    finished(tmp_path / "tmp", own, "--scenario", "pod_p", "--out", tmp_path / "whole", warm=warm)
     out = tmp_path / "out"
     process = started(
-        tmp_path / "tmp", own, "--scenario", "pod_p", "--out", out, "--checkpoint", "0.05"
+        tmp_path / "tmp",
+        own,
+        "--scenario",
+        "pod_p",
+        "--out",
+        out,
+        "--checkpoint",
+        "0.05",
+        warm=warm,
     )
     _, error = stopped_at_random(process, out, 1.0, signal.SIGTERM)
     assert process.returncode == 143, error
     assert list((tmp_path / "tmp").iterdir()) == []
     assert "gfor run --resume" in error
-    assert "it goes on from t = " in finished(tmp_path / "tmp", "--resume", out)
+    assert "it goes on from t = " in finished(tmp_path / "tmp", "--resume", out, warm=warm)
     assert values_of(out) == values_of(tmp_path / "whole")
 
 
@@ -305,11 +321,11 @@ def test_what_a_kill_left_before_the_first_rows_goes_with_the_next_start(gfor, t
 
 
 @pytest.mark.slow
-def test_a_kill_while_the_checkpoints_go_leaves_whole_results(tmp_path):
+def test_a_kill_while_the_checkpoints_go_leaves_whole_results(warm, tmp_path):
     words = ("infinite_bus", "--scenario", "dip", "--stop", "0.1")
-    finished(tmp_path / "tmp", *words, "--out", tmp_path / "whole")
+    finished(tmp_path / "tmp", *words, "--out", tmp_path / "whole", warm=warm)
     out = tmp_path / "out"
-    process = started(tmp_path / "tmp", *words, "--out", out)
+    process = started(tmp_path / "tmp", *words, "--out", out, warm=warm)
     kept = out / ".checkpoints"
     while not kept.exists() and process.poll() is None:
         time.sleep(0.001)
@@ -318,7 +334,7 @@ def test_a_kill_while_the_checkpoints_go_leaves_whole_results(tmp_path):
     process.kill()
     process.communicate(timeout=120)
     assert values_of(out) == values_of(tmp_path / "whole")
-    finished(tmp_path / "tmp", *words, "--out", out)
+    finished(tmp_path / "tmp", *words, "--out", out, warm=warm)
     assert [path.name for path in out.iterdir() if path.name.startswith(".")] == []
 
 

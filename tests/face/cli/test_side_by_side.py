@@ -61,7 +61,7 @@ def untimed(text, folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("own", ["", "isolated = true\n"])
-def test_all_files_are_those_of_one_after_the_other(tmp_path, own):
+def test_all_files_are_those_of_one_after_the_other(warm, tmp_path, own):
     text = (BUILT_IN / "infinite_bus" / "case.toml").read_text(encoding="utf-8")
     case = tmp_path / "case.toml"
     case.write_text(
@@ -72,7 +72,7 @@ def test_all_files_are_those_of_one_after_the_other(tmp_path, own):
     for workers in (1, 2):
         out = tmp_path / str(workers)
         words = (case, "--stop", "1.3", "--linear", "--out", out, "--workers", workers)
-        process = started(tmp_path / "tmp", *words, drawn=drawn)
+        process = started(tmp_path / "tmp", *words, drawn=drawn, warm=warm)
         code, said, error = printed(process)
         assert code == 0, error
         assert list((tmp_path / "tmp").iterdir()) == []
@@ -111,10 +111,12 @@ WORDS = ("--scenario", "gfor", "--scenario", "pod_pq", "--workers", "2")
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_signals_end_all_and_the_run_goes_on(long, tmp_path, number):
+def test_signals_end_all_and_the_run_goes_on(long, warm, tmp_path, number):
     """Ctrl-C of a terminal reaches all processes of the group, SIGTERM the command alone."""
     out = tmp_path / "out"
-    process = started(tmp_path / "tmp", long, *WORDS, "--out", out, "--checkpoint", "0.05")
+    process = started(
+        tmp_path / "tmp", long, *WORDS, "--out", out, "--checkpoint", "0.05", warm=warm
+    )
     both_under_way(process, out)
     (os.killpg if number == signal.SIGINT else os.kill)(process.pid, number)
     code, text, error = printed(process)
@@ -133,9 +135,11 @@ def test_signals_end_all_and_the_run_goes_on(long, tmp_path, number):
 
 
 @pytest.mark.slow
-def test_a_killed_command_takes_its_copies_along_and_goes_on(case, tmp_path):
+def test_a_killed_command_takes_its_copies_along_and_goes_on(case, warm, tmp_path):
     out = tmp_path / "out"
-    process = started(tmp_path / "tmp", case, *WORDS, "--out", out, "--checkpoint", "0.05")
+    process = started(
+        tmp_path / "tmp", case, *WORDS, "--out", out, "--checkpoint", "0.05", warm=warm
+    )
     both_under_way(process, out)
     assert len(processes_of(process.pid)) == 3
     process.kill()
@@ -144,8 +148,8 @@ def test_a_killed_command_takes_its_copies_along_and_goes_on(case, tmp_path):
     while processes_of(process.pid) and time.monotonic() < end:
         time.sleep(0.01)
     assert processes_of(process.pid) == []
-    finished(tmp_path / "tmp", "--resume", out, "--workers", "2")
-    finished(tmp_path / "tmp", case, *WORDS, "--out", tmp_path / "whole")
+    finished(tmp_path / "tmp", "--resume", out, "--workers", "2", warm=warm)
+    finished(tmp_path / "tmp", case, *WORDS, "--out", tmp_path / "whole", warm=warm)
     assert values_of(out) == values_of(tmp_path / "whole")
 
 

@@ -4,7 +4,6 @@ import json
 import os
 import shutil
 import signal
-import subprocess
 import time
 
 import pytest
@@ -16,7 +15,6 @@ from orchestrator.face.cli import run as command
 from orchestrator.output.results.lock import LOCK, hold_folder
 from orchestrator.systems.coupling.observers import Progress
 from tests.face.cli.test_resume import checkpoints_in
-from tests.support.undrawn import UNDRAWN
 
 fcntl = pytest.importorskip("fcntl", reason="Windows has no such lock")
 
@@ -26,7 +24,7 @@ SHORT = ("run", "infinite_bus", "--scenario", "dip", "--stop", "0.1")
 
 
 @pytest.fixture
-def live(tmp_path):
+def live(warm, tmp_path):
     """A run that goes on for long in another process, and its folder."""
     words = (
         "infinite_bus",
@@ -39,13 +37,7 @@ def live(tmp_path):
         "--out",
         tmp_path / "out",
     )
-    process = subprocess.Popen(
-        [*UNDRAWN, "run", *map(str, words)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=os.environ | {"TMPDIR": str(tmp_path)},
-    )
+    process = warm.started("run", *words, env=os.environ | {"TMPDIR": str(tmp_path)})
     end = time.monotonic() + 120
     while not checkpoints_in(tmp_path / "out"):
         assert process.poll() is None, process.communicate()
