@@ -2,8 +2,12 @@
 
 import re
 
+import pytest
+
 import orchestrator as gfor
 from orchestrator.face.cli import main
+
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 
 def test_a_folder_shows_the_verdict_of_each_scenario_in_its_own_colour_on_top(tmp_path):

@@ -7,9 +7,12 @@ import pytest
 import xarray as xr
 
 import orchestrator as gfor_api
+from orchestrator.face.cli import main
 from orchestrator.face.cli import run as command
 from orchestrator.output.results.manifest import ResultsWarning
 from orchestrator.systems.coupling.observers import Progress
+
+pytestmark = pytest.mark.slow  # both, or the runs would be made twice
 
 WORDS = ("run", "infinite_bus", "--scenario", "dip", "--stop", "3")
 
@@ -22,14 +25,14 @@ class Stops(Progress):
             raise KeyboardInterrupt
 
 
-@pytest.fixture
-def folders(gfor, tmp_path, monkeypatch):
-    """A whole run, and one that ended early."""
-    whole, cut = tmp_path / "whole", tmp_path / "cut"
-    assert gfor(*WORDS, "--out", whole)[0] == 0
-    with monkeypatch.context() as planted:
+@pytest.fixture(scope="module")
+def folders(undrawn, tmp_path_factory):
+    """A whole run, and one that ended early; they are read only."""
+    whole, cut = (tmp_path_factory.mktemp(name) for name in ("whole", "cut"))
+    assert main([*WORDS, "--out", str(whole)]) == 0
+    with pytest.MonkeyPatch.context() as planted:
         planted.setattr(command, "Progress", Stops)
-        assert gfor(*WORDS, "--out", cut)[0] == 130
+        assert main([*WORDS, "--out", str(cut)]) == 130
     return whole, cut
 
 

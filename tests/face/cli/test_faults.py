@@ -7,10 +7,10 @@ import json
 import os
 import resource
 import shutil
-import signal
 import subprocess
 import sys
 import time
+from io import BytesIO, TextIOWrapper
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,13 +18,30 @@ import pytest
 import xarray as xr
 
 from orchestrator.cases.case import load_case
+from orchestrator.face.cli import main
 from orchestrator.face.cli import run as command
 from orchestrator.output.results import recording_writer
 from orchestrator.output.results.manifest import read_manifest
 from orchestrator.systems.coupling.observers import Progress
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 RUN = ("run", "infinite_bus", "--scenario", "dip", "--scenario", "load_step", "--stop", "1.5")
 ONE = ("--workers", 1)  # in this process, with what a test changes in it
+
+
+@pytest.fixture(scope="module")
+def whole(undrawn, tmp_path_factory):
+    """Results of `RUN`."""
+    folder = tmp_path_factory.mktemp("whole")
+    assert main([*map(str, (*RUN, *ONE)), "--out", str(folder)]) == 0
+    return folder
+
+
+@pytest.fixture
+def results(whole, tmp_path):
+    """A copy of them, which a test may change; slow tests alone do, or the quick ones would make them as well."""
+    return shutil.copytree(whole, tmp_path / "results")
 
 
 @pytest.fixture
@@ -101,24 +118,24 @@ def test_a_run_of_many_years_or_many_terabytes_is_refused_with_the_reason(
     assert "Traceback" not in error
 
 
-def test_a_second_run_that_is_killed_does_not_mix_with_the_first(gfor, interfere, tmp_path):
+@pytest.mark.slow
+def test_a_second_run_that_is_killed_does_not_mix_with_the_first(gfor, interfere, results):
     """The first scenario is replaced, the second is not: the page is refused."""
-    assert gfor(*RUN, *ONE, "--out", tmp_path)[0] == 0
-    assert gfor("report", tmp_path)[0] == 0
+    assert gfor("report", results)[0] == 0
 
-    interfere(lambda: os.rename(tmp_path / "summary.json", tmp_path / "kept"))
-    assert gfor(*RUN, *ONE, "--set", "gfor.P_0=0.3", "--out", tmp_path)[0] == 0
+    interfere(lambda: os.rename(results / "summary.json", results / "kept"))
+    assert gfor(*RUN, *ONE, "--set", "gfor.P_0=0.3", "--out", results)[0] == 0
     # the first run's, as if the second had not ended
-    os.rename(tmp_path / "kept", tmp_path / "summary.json")
-    code, _, error = gfor("report", tmp_path)
+    os.rename(results / "kept", results / "summary.json")
+    code, _, error = gfor("report", results)
     assert code == 2
     assert "summary.json: " in error
     assert "of another run" in error
 
 
-def test_torn_results_are_refused_by_name_by_all_who_read_them(gfor, tmp_path):
-    assert gfor(*RUN, "--out", tmp_path)[0] == 0
-    file = tmp_path / "dip" / "trajectory.nc"
+@pytest.mark.slow
+def test_torn_results_are_refused_by_name_by_all_who_read_them(gfor, results):
+    file = results / "dip" / "trajectory.nc"
     content = file.read_bytes()
     for torn in (
         content[: len(content) // 2],
@@ -126,10 +143,10 @@ def test_torn_results_are_refused_by_name_by_all_who_read_them(gfor, tmp_path):
     ):
         file.write_bytes(torn)
         for words in (
-            ("report", tmp_path),
-            ("signal", "identify", tmp_path / "dip", "gfor.p"),
+            ("report", results),
+            ("signal", "identify", results / "dip", "gfor.p"),
             ("signal", "identify", file, "gfor.p"),
-            ("signal", "compare", tmp_path / "dip", tmp_path / "load_step"),
+            ("signal", "compare", results / "dip", results / "load_step"),
         ):
             code, _, error = gfor(*words)
             assert code == 2, words
@@ -137,13 +154,13 @@ def test_torn_results_are_refused_by_name_by_all_who_read_them(gfor, tmp_path):
             assert f"{file}: " in error
 
 
-def test_results_without_a_manifest_are_read_with_one_warning(gfor, tmp_path):
-    assert gfor(*RUN, "--out", tmp_path)[0] == 0
-    for path in tmp_path.rglob("manifest.json"):
+@pytest.mark.slow
+def test_results_without_a_manifest_are_read_with_one_warning(gfor, results):
+    for path in results.rglob("manifest.json"):
         path.unlink()
     for words in (
-        ("report", tmp_path),
-        ("signal", "compare", tmp_path / "dip", tmp_path / "load_step", "--signal", "gfor.p"),
+        ("report", results),
+        ("signal", "compare", results / "dip", results / "load_step", "--signal", "gfor.p"),
     ):
         code, _, error = gfor(*words)
         assert code == 0
@@ -166,61 +183,52 @@ def test_all_files_of_a_run_are_listed_with_its_id(gfor, tmp_path):
     )
 
 
-@pytest.mark.parametrize("encoding", ["latin-1", "ascii", "utf-8"])
-def test_a_terminal_that_lacks_characters(tmp_path, encoding):
-    words = [
-        "run",
-        "infinite_bus",
-        "--scenario",
-        "dip",
-        "--stop",
-        "1.2",
-        "--json",
-        "--out",
-        str(tmp_path),
-    ]
+@pytest.fixture
+def words_of_any_script(tmp_path):
+    """A short run of a case whose title has characters that terminals lack."""
     case = tmp_path / "case.toml"
     text = load_case("infinite_bus").text.replace('title = "', 'title = "Überlast λ 😀 ', 1)
     case.write_text(text, encoding="utf-8")
-    words[1] = str(case)
+    own = (str(case), "--out", str(tmp_path), "--json")
+    return ["run", *own, "--scenario", "dip", "--stop", "1.2"]
+
+
+def test_a_terminal_that_lacks_most_characters(words_of_any_script):
     done = subprocess.run(
-        [sys.executable, "-m", "orchestrator.face.cli", *words],
+        [sys.executable, "-m", "orchestrator.face.cli", *words_of_any_script],
         capture_output=True,
         check=False,
-        env={**os.environ, "PYTHONIOENCODING": encoding},
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
     )
     assert done.returncode == 0
     assert b"Traceback" not in done.stderr
-    assert json.loads(done.stdout.decode(encoding))[0]["name"] == "dip"
+    assert json.loads(done.stdout.decode("ascii"))[0]["name"] == "dip"
 
 
-KILLED = [
-    sys.executable,
-    "-m",
-    "orchestrator.face.cli",
-    "run",
-    "two_area",
-    "--scenario",
-    "base",
-    "--scenario",
-    "gfor",
-    "--stop",
-    "2000",
-    "--out",
-]
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-8"])
+def test_a_terminal_that_lacks_some_or_no_characters(words_of_any_script, monkeypatch, encoding):
+    printed = {name: BytesIO() for name in ("stdout", "stderr")}
+    for name, kept in printed.items():
+        errors = "strict" if name == "stdout" else "backslashreplace"  # as Python has them
+        monkeypatch.setattr(sys, name, TextIOWrapper(kept, encoding, errors, write_through=True))
+    assert main(words_of_any_script) == 0
+    assert b"Traceback" not in printed["stderr"].getvalue()
+    assert json.loads(printed["stdout"].getvalue().decode(encoding))[0]["name"] == "dip"
+
+
+KILLED = ("run", "two_area", "--scenario", "base", "--scenario", "gfor", "--stop", "2000", "--out")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("wait", [0.1, 0.7, 2.0])
-def test_what_was_recorded_until_a_kill_can_be_read(gfor, tmp_path, wait):
-    with subprocess.Popen(
-        [*KILLED, str(tmp_path)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    ) as process:
-        until = time.monotonic() + 120
-        while not list(tmp_path.glob("*.part-*/recording/[!.]*.nc")) and time.monotonic() < until:
-            time.sleep(0.05)
-        time.sleep(wait)
-        process.send_signal(signal.SIGKILL)
+def test_what_was_recorded_until_a_kill_can_be_read(gfor, warm, tmp_path, wait):
+    process = warm.started(*KILLED, tmp_path, env=os.environ)
+    until = time.monotonic() + 120
+    while not list(tmp_path.glob("*.part-*/recording/[!.]*.nc")) and time.monotonic() < until:
+        time.sleep(0.05)
+    time.sleep(wait)
+    process.kill()
+    process.communicate()
     # without half-written ones
     begun = [place for place in tmp_path.glob("*.part-*") if list(place.rglob("[!.]*.nc"))]
     for place in (

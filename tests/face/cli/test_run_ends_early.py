@@ -14,6 +14,8 @@ from orchestrator.studies.runs import run as study
 from orchestrator.studies.runs.run import run_scenario
 from orchestrator.systems.coupling.observers import Progress
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 WORDS = (
     "run",
     "two_area",

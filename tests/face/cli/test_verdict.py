@@ -8,6 +8,8 @@ import pytest
 
 from orchestrator.face.cli import main
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 FAST = ["--scenario", "gfor", "--set", "gfor.droop.R_f=10"]
 """A droop that makes the two-area system grow at 123 1/s and 37.9 Hz, far outside of the range that is shown."""
 

@@ -28,6 +28,8 @@ from orchestrator.face.explore.server import Explorer
 from orchestrator.face.explore.worker import Desk
 from tests.studies.certification.sign_turned import turned
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 BEGINNING = {"case": "two_area", "scenario": "pod_p", "values": {}, "range": [0.1, 2.0]}
 
 

@@ -28,7 +28,7 @@ RATINGS = {"gfor": 1500.0, "sg1": 1500.0, "sg2": 5000.0}  # [MVA]
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder(undrawn, tmp_path_factory):
     """Results of five studies, and a page of them all."""
     place = tmp_path_factory.mktemp("pages")
     points = place / "points.csv"

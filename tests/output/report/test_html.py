@@ -20,7 +20,7 @@ from tests.support.chromium import needs_chromium, running_browser
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory):
+def page(undrawn, tmp_path_factory):
     """Run, sweep and design of the two-area case in two scenarios, and the report on them."""
     folder = tmp_path_factory.mktemp("report")
     chosen = ["--scenario", "base", "--scenario", "pod_p"]
@@ -117,6 +117,7 @@ def test_a_browser_shows_it_without_errors_answers_the_pointer_and_prints(page, 
     assert "Two-area" in sheets[0].extract_text()
 
 
+@pytest.mark.slow  # or the quick ones would make the page as well
 def test_what_is_no_folder_of_a_run_is_said(tmp_path, page):
     with pytest.raises(InputError, match="nothing in it can be used for a report"):
         write_report(tmp_path)

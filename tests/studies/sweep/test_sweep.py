@@ -29,6 +29,7 @@ from orchestrator.studies.sweep.sweep import ScenarioSweep, plan_sweep, run_swee
 from tests.studies.sweep.sweep_case import two_oscillators
 from tests.support.interruption import interrupted_after
 from tests.support.scenarios import prepare_one
+from tests.support.undrawn import write_empty
 
 FULL_TURN = 2 * np.pi
 
@@ -60,6 +61,13 @@ def curve(scenario, name):
 
 
 # -- what it says ------------------------------------------------------------------------------------
+
+
+@pytest.fixture(autouse=True)
+def undrawn_elsewhere(request, monkeypatch):
+    """One test looks at the pictures."""
+    if request.function is not test_a_named_mode_is_followed_through_a_crossing:
+        monkeypatch.setattr("matplotlib.figure.Figure.savefig", write_empty)
 
 
 def test_a_named_mode_is_followed_through_a_crossing(gfor, case, tmp_path):
