@@ -61,8 +61,8 @@ def _file_of(test: str) -> str:
     return test.partition("::")[0]
 
 
-elsewhere: list[float] = []
-"""Seconds of processor of commands of which another process waits for the end, until that one has ended as well."""
+elsewhere = Counter[object]()
+"""Seconds of processor of commands of which another process waits for the end, by that process, until it has ended."""
 
 
 class Measure:
@@ -82,4 +82,4 @@ class Measure:
 
 
 def _processor() -> float:
-    return sum(os.times()[:4]) + sum(elsewhere)
+    return sum(os.times()[:4]) + elsewhere.total()

@@ -34,8 +34,9 @@ _PATIENCE = 0.01  # between two looks at a process [s]
 class Ran:
     """A process of `Warm`, with what `subprocess.Popen` has of one."""
 
-    def __init__(self, line: socket.socket, outputs: tuple[int, int]) -> None:
+    def __init__(self, line: socket.socket, outputs: tuple[int, int], parent: Path) -> None:
         self._line, self._outputs = line, [os.fdopen(one, "rb") for one in outputs]
+        self._parent = parent
         self.pid = int(line.recv(64))
         self.returncode: int | None = None
 
@@ -70,7 +71,7 @@ class Ran:
             code, seconds = self._line.recv(64).split()
             self.returncode = int(code)
             self._line.close()
-            elsewhere.append(float(seconds))
+            elsewhere[self._parent] += float(seconds)
         return self.returncode
 
 
@@ -97,13 +98,13 @@ class Warm:
         asked = {"words": [str(word) for word in words], "env": dict(env), "drawn": drawn}
         asked["folder"] = os.getcwd()
         socket.send_fds(line, [json.dumps(asked).encode()], outputs)
-        return Ran(line, outputs)
+        return Ran(line, outputs, self.address)
 
     def close(self) -> None:
         assert self._parent.stdin is not None
         self._parent.stdin.close()
         self._parent.wait()
-        elsewhere.clear()  # it waited for all of them, and this process for it
+        del elsewhere[self.address]  # it waited for all of them, and this process for it
 
 
 def _unnamed_file() -> int:
