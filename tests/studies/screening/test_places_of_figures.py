@@ -8,7 +8,7 @@ import pytest
 
 from orchestrator.output.report.html.elements import Figures
 from orchestrator.studies.operating_points.item import Status
-from orchestrator.studies.screening import point, view
+from orchestrator.studies.screening import command, point, view
 from orchestrator.studies.screening.point import _Worker
 from orchestrator.studies.screening.summary import ModeAt
 
@@ -93,6 +93,21 @@ def test_a_stretch_is_joined_by_the_modes_of_its_anchor_and_of_its_last_intact_i
     made = _Worker._record(own, results)
     assert (made.first, made.last, made.last_place) == ("anchor", "one", 1)
     assert (made.items, made.perturbed, made.reused) == (("anchor", "one", "out"), 3, 5)
+
+
+@pytest.mark.parametrize(
+    ("outages", "points", "shown"), [(1, 1, False), (1, 2, True), (2, 1, True)]
+)
+def test_of_one_item_the_headline_and_the_modes_say_all(outages, points, shown, monkeypatch):
+    """The system without an outage counts as one of the outages."""
+    for name in ("verdict", "overview", "limits_table", "runs_table", "no_modes", "modes_table"):
+        absent = name in ("limits_table", "runs_table", "no_modes")
+        monkeypatch.setattr(command, name, lambda summary, told=None if absent else name: told)
+    plan = SimpleNamespace(outages=["intact"] * outages, points=["p"] * points)
+    found = SimpleNamespace(result=SimpleNamespace(plan=plan), summary=None)
+    assert [part for part in command._parts(found) if part] == (
+        ["verdict", *["overview"] * shown, "modes_table"]
+    )
 
 
 @pytest.mark.parametrize("everywhere", [True, False])
