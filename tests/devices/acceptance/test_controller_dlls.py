@@ -4,15 +4,19 @@ import struct
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import SimpleNamespace
 
 import pytest
 
 import orchestrator as gfor
 from orchestrator.core.errors import InputError
 from orchestrator.devices.acceptance.checks.base import Verdict
+from orchestrator.devices.acceptance.controller_dll import conformity
 from orchestrator.devices.acceptance.controller_dll.conformity import check_dll
 from orchestrator.devices.acceptance.controller_dll.file_head import read_head
 from orchestrator.devices.acceptance.controller_dll.questions import DLL_QUESTIONS, REMEDIES
+from orchestrator.devices.acceptance.controller_dll.subject import ErrorInRunError
+from orchestrator.devices.sandbox.dll_process import DllEndedError, DllNotLoadedError
 from tests.support.vendor_dlls import CALLS, compiled, lag
 
 LATE = "if (s->time > 0.005) "
@@ -239,6 +243,29 @@ def test_what_ends_with_an_error_whatever_its_inputs_is_not_judged(written):
     assert (result.check, result.verdict) == ("dll_restart", Verdict.NOT_APPLICABLE)
     assert "it ends with an error whatever its inputs: Model_Outputs at 0.00" in result.evidence
     assert "no file" in result.evidence
+
+
+@pytest.mark.parametrize(
+    ("error", "verdict", "fault", "evidence"),
+    [
+        (
+            ErrorInRunError("no file"),
+            Verdict.NOT_APPLICABLE,
+            "",
+            "because it ends with an error whatever its inputs: no file",
+        ),
+        (DllNotLoadedError("no symbol"), Verdict.FAIL, "not loadable", "no symbol"),
+        (DllEndedError("crash", "it died", ""), Verdict.FAIL, "crash", "it died"),
+    ],
+)
+def test_an_error_in_a_check_is_its_result(error, verdict, fault, evidence, monkeypatch):
+    def run(subject):
+        raise error
+
+    monkeypatch.setitem(conformity.DLL_CHECKS, "dll_restart", SimpleNamespace(run=run))
+    result = conformity._answer("dll_restart", None)
+    assert (result.check, result.verdict, result.fault) == ("dll_restart", verdict, fault)
+    assert evidence in result.evidence
 
 
 def test_a_thread_left_behind_and_other_rounding_are_remarks(written):

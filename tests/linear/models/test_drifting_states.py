@@ -87,9 +87,9 @@ def battery(moves=0.0, grows=0.0):
 
 @pytest.mark.parametrize("grows", [0.0, 0.5])
 def test_a_rate_is_watched_over_a_thousand_steps(grows, tmp_path):
-    """The charge is 0.2·(t + grows·t²/2), of which a step from t to t + H sees the mean rate."""
+    """The charge is 0.3 + 0.2·(t + grows·t²/2), of which a step from t to t + H sees the mean rate."""
     m = ModelBuilder("charge", "A charge whose rate grows")
-    age, charge = (m.state(name, 0.0, "1", name) for name in ("age", "charge"))
+    age, charge = (m.state(name, at, "1", name) for name, at in (("age", 0.0), ("charge", 0.3)))
     m.derivative(age, Expr(1.0))
     m.derivative(charge, 0.2 * (1 + grows * age))
     m.output("y", Expr(0.0), "1", "Nothing")
