@@ -63,6 +63,26 @@ def test_a_controller_is_tried_in_swings_three_and_twelve_times_as_large(usual, 
     assert sizes == pytest.approx(larger)
 
 
+@pytest.mark.parametrize(
+    ("up", "down", "told"),
+    [(0.04, 0.04, True), (9.0, 0.04, True), (9.0, 9.0, False), (0.09, 0.09, False)],
+    ids=["both ways", "one way", "no limit", "near enough"],
+)
+def test_a_limit_that_is_seen_in_the_power_alone_is_reached_by_two_deviations(up, down, told):
+    """Of 0.1 pu as declared; a lasting deviation brings a quarter of what a swing of its size does."""
+    limit, size, peak = 0.1, 1e-3, 0.02
+
+    def plateaus(deviation, seconds):
+        return [min(0.25 * peak * abs(deviation) / size, up if deviation > 0 else down)]
+
+    trial = damping._Trial(SimpleNamespace(plateaus=plateaus, widest=1.0))
+    trial._size, trial._usual = size, (SimpleNamespace(peak=peak, title="POD-P"),)
+    found = trial._limit_of_power(0, limit)
+    assert (found is not None) is told
+    if found is not None:
+        assert "POD-P gives no more than 0.04 pu where 0.1 pu is declared" in found.words
+
+
 @pytest.mark.parametrize("name", ["pod_of_the_minute", "pod_dead_after_a_date"])
 def test_a_controller_that_follows_the_clock_is_found(name, gallery):
     assert "the clock of its process" in failure_of(gallery, name).evidence

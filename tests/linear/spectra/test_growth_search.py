@@ -28,6 +28,18 @@ def test_growing_modes_come_fastest_first():
     assert {name for name, _ in found.fastest.participation[:2]} == {"x2", "x3"}
 
 
+def test_the_parts_of_a_sector_are_alike_and_hold_each_of_its_points_once():
+    whole = growth_search._Sector(2.0, 18.0, -0.5, 0.7)
+    parts = whole.parts()
+    assert len(parts) == 4
+    for one in parts:
+        assert (one.outer / one.inner, one.high - one.low) == pytest.approx((3.0, 0.6))
+    random = np.random.default_rng(1)
+    for radius, angle in random.uniform((1.0, -1.0), (20.0, 1.2), (200, 2)):
+        value = radius * np.exp(1j * angle)
+        assert sum(one.holds(value) for one in parts) == whole.holds(value)
+
+
 @pytest.fixture
 def in_blocks(monkeypatch):
     """Models of this size are searched as large ones are."""
