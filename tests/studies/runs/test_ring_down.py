@@ -8,7 +8,7 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.studies.runs import tables
-from orchestrator.studies.runs.ring_down import ring_down_of
+from orchestrator.studies.runs.ring_down import _obstacle, ring_down_of
 from orchestrator.studies.runs.run import run_scenario
 from orchestrator.studies.signals import signal_modes
 from tests.support.scenarios import prepare_one
@@ -47,6 +47,25 @@ def test_what_is_no_ring_down_of_the_mode_is_not_shown(tmp_path, events, stop, w
     assert result.ring_down is None
     (said,) = [text for text in result.modes.warnings if "no ring-down" in text]
     assert why in said
+
+
+@pytest.mark.parametrize(
+    ("at", "why"),
+    [
+        (2.0, ""),  # the event that the window begins at
+        (2.1, "step falls into its window, from t = 2 s to t = 8 s"),
+        (7.9, "step falls into its window, from t = 2 s to t = 8 s"),
+        (8.0, ""),
+    ],
+)
+def test_an_event_within_a_window_is_in_the_way(at, why):
+    class Step(SimpleNamespace):
+        def __str__(self):
+            return "step"
+
+    modes = SimpleNamespace(prepared=SimpleNamespace(events=[Step(time=at)]))
+    times = np.linspace(2.0, 8.0, 13)
+    assert _obstacle(modes, SimpleNamespace(frequency_hz=0.6), times, []) == why
 
 
 @pytest.mark.parametrize(("moved", "shown"), [(1.0, True), (1.15, True), (1.5, False)])

@@ -6,6 +6,7 @@ import xarray as xr
 
 from orchestrator.core.errors import AnalysisError, InputError
 from orchestrator.face.api.identification import identify
+from orchestrator.studies.signals import comparison
 from orchestrator.studies.signals.common_times import common_times
 from orchestrator.studies.signals.comparison import compare, most_different
 
@@ -129,3 +130,16 @@ def test_a_signal_that_is_no_number_is_one_error():
         identify(two.assign_attrs(scenario="second"), "g.x")
     with pytest.raises(AnalysisError, match="constant"):
         identify(two, "g.x", stop=8.0)  # there it is one
+
+
+def test_without_doubts_modes_are_judged_by_the_length_of_their_window(monkeypatch):
+    """What rings for less than a period of it is none, wherever the window begins."""
+    found, judged = [object()], []
+    monkeypatch.setattr(comparison, "_modes_of", lambda curve, order: found)
+    monkeypatch.setattr(
+        comparison, "worth_showing", lambda modes, seconds, weakest: judged.append(seconds) or modes
+    )
+    times = np.linspace(10.0, 14.0, 5)
+    curve = xr.DataArray(np.sin(times), coords={"time": times}, dims="time")
+    assert comparison.modes_without_doubts(curve) is found
+    assert judged == [4.0]
