@@ -1,9 +1,14 @@
 """Excitations and what is read from their responses, on a linear map whose response is known."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from orchestrator.studies.black_box import frequency_response
 from orchestrator.studies.black_box.frequency_response import (
+    Excitation,
+    _by_multisine,
     _drifts_evenly,
     line_response,
     multisine,
@@ -79,3 +84,30 @@ def test_only_a_small_change_at_one_rate_is_a_drift(course, even):
     """The response of a battery follows its charge; what dies away, grows or changes much is not measured."""
     found = [np.full((3, 2), 1 + course(k), complex) for k in range(41)]
     assert _drifts_evenly(found, 1) == even
+
+
+@pytest.mark.parametrize("growth", [0.0, 1e-5], ids=["settled", "drifts evenly"])
+def test_what_comes_back_in_a_period_is_told_by_its_mean_and_by_the_swing_around_it(
+    growth, monkeypatch
+):
+    """Of a period of 1 s in steps of 10 ms; what drifts grows by a hundred-thousandth in each."""
+    told = []
+    monkeypatch.setattr(
+        frequency_response,
+        "_check_returned",
+        lambda bench, column, mean, swing: told.append((column, mean, swing)),
+    )
+    bench = SimpleNamespace(step_size=0.01, inputs=("v_re", "v_im"))
+
+    def respond(periods):
+        for k, deviations in enumerate(periods):
+            yield 0.4 + (1 + growth * k) * 0.5 * deviations[:, 1:]
+
+    runs, asked = SimpleNamespace(respond=respond), Excitation(lowest_hz=1.0, settled=1e-6)
+    lines = np.array([1, 3, 7])
+    *_, seconds = _by_multisine(runs, bench, asked, lines, 1, 0.02)
+    ((column, mean, swing),) = told
+    grown = 1 + growth * (round(seconds) - 1)
+    u = multisine(lines, 100, 0.02)
+    assert (column, mean) == (1, pytest.approx(0.4, rel=1e-6))
+    assert swing == pytest.approx(0.5 * grown * np.abs(u).max(), rel=1e-6)
