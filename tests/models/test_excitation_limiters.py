@@ -18,6 +18,17 @@ TIMED = POINTS | {"TIME3": 0.5, "EFDDES": 1.0, "KMX": 0.1, "VLOW": -0.2}
 CIRCLE = {"K_F2": 0.0, "T_F2": 1.0, "K_M": 2.0, "T_M": 0.1, "MELMAX": 9.0, "Q_0": 1.3, "R": 1.9}
 
 
+@pytest.mark.parametrize("name", ["maxex1", "maxex2"])
+def test_every_point_of_the_inverse_time_may_lie_as_low_as_the_first(name):
+    model = limiter(TIMED, oel=OELS[name]).model
+    least = {
+        variable.name.rpartition(".")[2]: variable.minimum
+        for variable in model.parameters
+        if variable.name.rpartition(".")[2][:-1] in ("EFD", "TIME")
+    }
+    assert least == dict.fromkeys(("EFD1", "TIME1", "EFD2", "TIME2", "EFD3", "TIME3"), 0)
+
+
 def overexcited(I_fd, E_fd=E_FD, end=1.0, values=TIMED, name="maxex2", x=None):
     alone = limiter(values, oel=OELS[name])
     assert not refused(alone)

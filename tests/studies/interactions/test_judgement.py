@@ -266,7 +266,11 @@ def test_without_any_vendor_the_same_modes_count_as_with_one():
     swing, bare = mode(8.0), mode(6.0, 10.0, sg1=1.0)
     with_vendors = {name: system(swing, resonance) for name in ALL}
     found = judged(**with_vendors | {"NONE": system(bare, resonance)})
-    rows = systems_table(found.judgement).records()
+    table = systems_table(found.judgement)
+    names = [table.columns[0].get(row) for row in table.rows]
+    pairs = ["A + B", "A + C", "B + C"]
+    assert names == ["no vendor", "A alone", "B alone", "C alone", *pairs]
+    rows = table.records()
     dampings = [row["least_damping_percent"] for row in rows]
     assert dampings == pytest.approx([6.0] + [8.0] * 6)
     assert [row["least_damping_of_all_percent"] for row in rows] == pytest.approx([0.2] * 7)

@@ -7,7 +7,7 @@ import pytest
 import orchestrator as gfor_in_python
 from orchestrator.studies.validation.hypotheses import _is_whole
 from orchestrator.studies.validation.limits import EXAMPLE
-from orchestrator.studies.validation.out_of_step import slip
+from orchestrator.studies.validation.out_of_step import slip, step_loss
 from orchestrator.studies.validation.record import Recording
 from orchestrator.studies.validation.windows import Windows
 from tests.studies.validation.recordings import SOLVER, table, with_noise
@@ -122,16 +122,15 @@ def test_a_model_that_turns_past_its_plant_is_told_though_it_is_off_by_little(de
     assert "slips" not in kinds(validated(recorded, PLANT))
 
 
-def slipped(angle, seen=0.5, own=0.5):
-    """The moment of a slip; currents [pu], and the angle between them from 1 s on [turns]."""
-    size = np.where(TIMES < 1, seen, own)
+def recording_of(power):
+    """A recording of a power [pu] at the rated voltage."""
     everywhere = np.ones(len(TIMES), dtype=bool)
-    recording = Recording(
+    return Recording(
         label="rec",
         begin=0.0,
         interval=1e-3,
         voltage=everywhere.astype(complex),
-        power=np.full(len(TIMES), seen + 0j),
+        power=power,
         good=everywhere,
         driven=everywhere,
         frame_hz=50.0,
@@ -139,8 +138,28 @@ def slipped(angle, seen=0.5, own=0.5):
         average=0.02,
         channels={},
     )
-    windows = Windows(begin=1.0, end=1.1, length=float(TIMES[-1]))
-    return slip(recording, windows, size * np.exp(2j * np.pi * angle))
+
+
+FROM_1_S = Windows(begin=1.0, end=1.1, length=float(TIMES[-1]))
+
+
+@pytest.mark.parametrize(("off", "lost"), [(0.1, True), (0.15, False)])
+def test_a_model_is_in_step_while_it_is_off_by_two_fifths_of_the_plants_movement(off, lost):
+    """The plant moves by 0.3 pu; the model is off by so much from 1 s on, and by 1.6 pu from 3 s on."""
+    plant = np.where(TIMES < 1, 0.5, 0.8) + 0j
+    model = plant + np.where(TIMES < 1, 0.0, np.where(TIMES < 3, off, 1.6))
+    found = step_loss(recording_of(plant), FROM_1_S, model)
+    assert (found is not None) is lost
+    if found is not None:
+        assert found.time == pytest.approx(3.0, abs=0.1)
+        assert (found.own, found.seen) == pytest.approx((2.4, 0.8))
+
+
+def slipped(angle, seen=0.5, own=0.5):
+    """The moment of a slip; currents [pu], and the angle between them from 1 s on [turns]."""
+    size = np.where(TIMES < 1, seen, own)
+    recording = recording_of(np.full(len(TIMES), seen + 0j))
+    return slip(recording, FROM_1_S, size * np.exp(2j * np.pi * angle))
 
 
 def test_a_slip_begins_where_the_model_leaves_the_plant():
