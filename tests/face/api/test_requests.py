@@ -56,6 +56,17 @@ def test_options_and_keywords_give_the_same_request():
     assert read(*words) == Some(**checked(Some, keywords)) == Some(0.2, 0.07, 2, ("a", "b"), True)
 
 
+def test_a_run_takes_one_thread_and_more_and_not_none():
+    kind = asked_of(RunRequest)["threads"].kind
+    for number in (1, 2):
+        assert kind.read(str(number)) == kind.check(number, "threads") == number
+    with pytest.raises(ValueError, match="from 1 to"):
+        kind.read("0")
+    with pytest.raises(InputError, match="from 1 to"):
+        kind.check(0, "threads")
+    assert kind.check(None, "threads") is None
+
+
 def test_none_is_what_was_not_asked_only_where_it_is_the_default():
     assert checked(Some, {"damping": None}) == {"damping": None}
     with pytest.raises(InputError, match="least_damping = None"):

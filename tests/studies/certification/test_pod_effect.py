@@ -129,3 +129,13 @@ def test_a_point_that_could_not_be_had_with_it_off_is_computed_anew():
     """What was in the way, such as a missing licence, may be gone."""
     assert point().lasting
     assert not replace(point(), off=None, off_failure="no licence").lasting
+
+
+@pytest.mark.parametrize(("samples", "seen"), [(99, True), (98, False)])
+def test_a_response_of_99_samples_tells_something_and_a_shorter_one_nothing(samples, seen):
+    """From half a second after the event at 1 s, which is the 300th sample."""
+    whole = point()
+    part = slice(300 + samples)
+    signals = {POWER: whole.signals[POWER][part]}
+    (v,) = judged(replace(whole, times=whole.times[part], signals=signals))
+    assert (v.pod.better_off is not None) is seen

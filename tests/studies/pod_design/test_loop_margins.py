@@ -1,6 +1,7 @@
 """Margins of a feedback loop: textbook loops, several loops at once, and what is no loop at all."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -35,6 +36,13 @@ def test_a_motors_position_loop():
     assert found.delay == pytest.approx(math.radians(found.phase_deg) / w, rel=1e-8)
     curve = 1j * np.linspace(0.1, 10, 200_001)
     assert found.peak == pytest.approx((1 / abs(1 + 1 / (curve * (curve + 1)))).max(), rel=1e-4)
+
+
+@pytest.mark.parametrize("change", [{"step_size": 0.01}, {"names": ("a", "b")}])
+def test_models_that_are_not_continuous_or_of_other_states_are_refused(change):
+    full = replace(model(motor(1.0)), **change)
+    with pytest.raises(ValueError, match="two continuous models with the same states"):
+        loop_margins(model(motor(0.5)), full)
 
 
 def test_a_crossing_at_the_end_of_the_range_counts():
