@@ -41,8 +41,13 @@ def write(seconds: dict[str, float], path: Path = LIST) -> None:
 
 def catching() -> set[str]:
     """Tests that caught a planted mistake, without the values of their parameters."""
+    return {without_values(test) for test in catches()}
+
+
+def catches() -> set[str]:
+    """Tests that caught a planted mistake, as pytest calls them."""
     results = (json.loads((Path(__file__).parent / name).read_text("utf-8")) for name in _MISTAKES)
-    return {without_values(one["by"]) for found in results for one in found.values()} - {""}
+    return {one["by"] for found in results for one in found.values()} - {""}
 
 
 def without_values(test: str) -> str:
