@@ -2,6 +2,7 @@
 
 import pytest
 
+from tests.benchmarks.durations import catches
 from tests.support.durations import LIST, LONGEST, NIGHTLY, Measure, longest_first, mark, read_list
 
 
@@ -66,3 +67,16 @@ def test_what_runs_by_night_is_there_and_is_none_of_the_papers_tables():
             or not name
         ), line
         assert "papers" not in name
+
+
+def test_what_caught_a_mistake_is_there_and_quick():
+    """Else the quick tests find fewer mistakes than `tests/benchmarks` says: name there a quick test that does."""
+    nightly, slow = tuple(NIGHTLY.read_text(encoding="utf-8").split("\n")[:-1]), read_list()
+    assert not [test for test in catches() if test in slow or test.startswith(nightly)]
+    assert not [test for test in catches() if not _is_there(*test.partition("::")[::2])]
+
+
+def _is_there(file, name):
+    path = LIST.parents[1] / file
+    function = f"def {name.partition('[')[0]}(" if name else ""  # a file of which none could run
+    return path.exists() and function in path.read_text(encoding="utf-8")
