@@ -9,7 +9,7 @@ from orchestrator.studies.validation.limits import EXAMPLE
 from orchestrator.studies.validation.page import _model
 from orchestrator.studies.validation.view import Validation, parts
 from orchestrator.studies.validation.words import difference_sentence
-from tests.studies.validation.recordings import run, table, with_noise, written
+from tests.studies.validation.recordings import phasor_plant, run, table, with_noise, written
 
 ON = {"pod_p.enabled": True}
 
@@ -39,9 +39,11 @@ def test_the_phasor_and_the_emt_model_come_out_of_one_command(gfor, tmp_path):
 
 def test_models_that_differ_more_from_each_other_than_from_the_record_are_told():
     # the plant's gain lies between those of its two models
-    recording = with_noise(table(run("pod_p", gfor__pod_p__K=120.0))).set_index("time")
+    recording = with_noise(phasor_plant()).set_index("time")
     first, second = (
-        gfor_in_python.validate("gfor", recording, values=ON | {"pod_p.K": gain}).result
+        gfor_in_python.validate(
+            "gfor_phasor", recording, values=ON | {"pod_p.K": gain}, step="1 ms"
+        ).result
         for gain in (60.0, 180.0)
     )
     apart = models_apart(first.comparisons[0], second.comparisons[0])
@@ -52,7 +54,7 @@ def test_models_that_differ_more_from_each_other_than_from_the_record_are_told()
 
 
 def test_the_first_line_names_the_model_with_the_larger_error():
-    recording = with_noise(table(run("pod_p", gfor__pod_p__K=120.0))).set_index("time").loc[:3.0]
+    recording = with_noise(phasor_plant()).set_index("time")
     of_gains = {
         gain: gfor_in_python.validate(
             "gfor_phasor", recording, values=ON | {"pod_p.K": gain}, step="1 ms"

@@ -8,15 +8,14 @@ import pytest
 import orchestrator as gfor_in_python
 from orchestrator.core.errors import INTERRUPTED, ComponentError, ErrorKind, FmuFileError
 from orchestrator.studies.validation.trials import TrialLog
-from tests.studies.validation.recordings import run, table, with_noise, written
+from tests.studies.validation.recordings import phasor_plant, with_noise, written
 
-STEP = "500 us"
+MODEL, STEP = "gfor_phasor", "1 ms"
 
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
-    clean = table(run("pod_p", stop=3.0, gfor__pod_p__K=120.0))
-    return written(with_noise(clean), tmp_path_factory.mktemp("interrupted"))
+    return written(with_noise(phasor_plant()), tmp_path_factory.mktemp("interrupted"))
 
 
 class Interrupt:
@@ -32,7 +31,7 @@ class Interrupt:
 
 def test_an_interrupted_search_keeps_the_causes_that_were_found(recording):
     report = Interrupt("sensitivity to droop")
-    found = gfor_in_python.validate("gfor", recording, explain=True, step=STEP, report=report)
+    found = gfor_in_python.validate(MODEL, recording, explain=True, step=STEP, report=report)
     content = found.as_json()
     assert content["finished"] is False
     assert "pod_p.enabled" in [one["parameter"] for one in content["explanations"]]
@@ -43,7 +42,7 @@ def test_an_interrupted_search_keeps_the_causes_that_were_found(recording):
 def test_an_interrupted_search_starts_no_fit(recording):
     report = Interrupt("trying")
     found = gfor_in_python.validate(
-        "gfor", recording, explain=True, fit="pod_p.K", step=STEP, report=report
+        MODEL, recording, explain=True, fit="pod_p.K", step=STEP, report=report
     )
     assert found.result.fit is None
     assert found.as_json()["explanations"] == []
@@ -60,20 +59,20 @@ def test_a_fit_that_is_interrupted_before_it_has_values_leaves_the_figures(
 
     monkeypatch.setattr(study, "fit_parameters", stopped)
     options = ("--fit", "pod_p.K", "--step", STEP)
-    code, out, _ = gfor("validate", "gfor", str(recording), *options, "--json")
+    code, out, _ = gfor("validate", MODEL, str(recording), *options, "--json")
     content = json.loads(out)
     assert code == INTERRUPTED
     assert content["finished"] is False
     assert content["events"][0]["windows"]
     assert "fit" not in content
-    code, out, _ = gfor("validate", "gfor", str(recording), *options)
+    code, out, _ = gfor("validate", MODEL, str(recording), *options)
     assert code == INTERRUPTED
     assert "Interrupted before a fit had any values" in out
 
 
 def test_what_does_not_run_is_named_with_the_reason(recording):
     """Read as of one phase, the plant feeds more than the device takes."""
-    found = gfor_in_python.validate("gfor", recording, step=STEP).as_json()
+    found = gfor_in_python.validate(MODEL, recording, step=STEP).as_json()
     assert found["finished"] is True
     by_name = {one["tried"]: one for one in found["refused"]}
     refused = by_name["P and Q are of one phase"]

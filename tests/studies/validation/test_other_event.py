@@ -7,7 +7,7 @@ import orchestrator as gfor_in_python
 from tests.studies.validation.recordings import NOISE, run, table, with_noise
 
 ON = {"pod_p.enabled": True}
-STEP = "500 us"
+MODEL, STEP = "gfor_phasor", "1 ms"
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +17,7 @@ def good():
 
 def asked(frame, values=None):
     given = ON | (values or {})
-    found = gfor_in_python.validate("gfor", frame.set_index("time"), values=given, step=STEP)
+    found = gfor_in_python.validate(MODEL, frame.set_index("time"), values=given, step=STEP)
     return found.as_json()["events"][0]["questions"]
 
 
@@ -83,7 +83,7 @@ def drifting(frame, values):
     """A right recording of a plant in a grid whose angle drifts from 2 s on: the device itself makes P and Q."""
     turned = frame.angle_deg + 360 * 0.02 * np.clip(frame.time - 2, 0, None)
     given = frame.assign(angle_deg=turned).set_index("time")
-    made = gfor_in_python.validate("gfor", given, values=values, step=STEP, average=0).curves()
+    made = gfor_in_python.validate(MODEL, given, values=values, step=STEP, average=0).curves()
     made.index = frame.index
     clean = frame.assign(
         angle_deg=turned, p_mw=1500 * made.p_simulated, q_mvar=1500 * made.q_simulated

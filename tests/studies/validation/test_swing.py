@@ -9,7 +9,7 @@ import orchestrator as gfor_in_python
 from tests.studies.validation.recordings import run, table, with_noise
 
 ON = {"pod_p.enabled": True}
-STEP = "500 us"
+MODEL, STEP = "gfor_phasor", "1 ms"
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +18,7 @@ def clean():
 
 
 def swings(frame):
-    found = gfor_in_python.validate("gfor", frame.set_index("time"), values=ON, step=STEP)
+    found = gfor_in_python.validate(MODEL, frame.set_index("time"), values=ON, step=STEP)
     return found, found.as_json()["events"][0]["swings"]
 
 
@@ -61,9 +61,7 @@ def test_samples_before_the_event_or_missing_do_not_enlarge_the_swing(clean):
 def test_the_first_line_lays_the_error_beside_the_swing_and_judges_nothing(gfor, clean, tmp_path):
     path = tmp_path / "rec.csv"
     with_noise(smaller(clean, "p_mw", 0.8)).to_csv(path, index=False)
-    code, out, _ = gfor(
-        "validate", "gfor", str(path), "--set", "pod_p.enabled=true", "--step", STEP
-    )
+    code, out, _ = gfor("validate", MODEL, str(path), "--set", "pod_p.enabled=true", "--step", STEP)
     first = " ".join(out.partition("Events")[0].split())
     assert code == 0
     (megawatts,) = re.findall(r"\((\S+) MW\)", first)

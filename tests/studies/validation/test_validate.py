@@ -229,7 +229,7 @@ def test_the_page_holds_the_fit_and_what_explains_the_error(recording, tmp_path)
     frame = pd.read_csv(recording)[::5].set_index("time")
     values = ON | {"pod_p.K": 60.0}
     found = gfor_in_python.validate(
-        "gfor_phasor", frame, values=values, fit="pod_p.K", explain=True
+        "gfor_phasor", frame, values=values, fit="pod_p.K", explain=True, step="1 ms"
     )
     page = found.html()
     assert "Fitted parameters" in page
