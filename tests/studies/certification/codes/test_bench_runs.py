@@ -28,7 +28,8 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def converter(tmp_path_factory):
-    return gfor.build("gfor", tmp_path_factory.mktemp("fmu"))
+    """Compiled, which gives what the one with Python in it gives in half the time."""
+    return gfor.build("gfor", tmp_path_factory.mktemp("fmu"), native=True)
 
 
 @pytest.fixture

@@ -29,7 +29,8 @@ TRUE = {"X_eff": 0.15, "D": 20.0, "H": 1.0}
 
 @pytest.fixture(scope="module")
 def converter(tmp_path_factory):
-    return gfor.build("gfor", tmp_path_factory.mktemp("fmu"))
+    """Compiled, which gives what the one with Python in it gives in half the time."""
+    return gfor.build("gfor", tmp_path_factory.mktemp("fmu"), native=True)
 
 
 @pytest.fixture(name="gfor_command")
