@@ -212,6 +212,37 @@ def test_two_lines_side_by_side_have_their_number_at_their_flow(window):
     assert odd == ["2 lines: 200 MW"]
 
 
+def test_a_slider_tells_where_its_step_leaves_another_mode_least_damped(window):
+    """Its points are those of the mode shown: where that one is damped more, another one may become the worst."""
+    path = ROOT / ".docs" / "live" / "ieee39.html"
+    held = saved(path)
+    mover = next(x for x in held["movers"]["movers"] if x["parameter"] == "gfor38.pod_p.T_S1")
+    end = mover["value"] + mover["step"]
+    upper = min(x for x in held["grid"][mover["parameter"]] if x >= end)
+    answer = next(x for x in held["answers"] if x["values"] == {mover["parameter"]: upper})[
+        "answer"
+    ]
+    other = min(answer["modes"]["scenarios"][0]["modes"], key=lambda mode: mode["damping_percent"])[
+        "frequency_hz"
+    ]
+    view = window(viewport={"width": 1280, "height": 900})
+    view.goto(path.as_uri())
+    view.locator("#movers .control").first.wait_for()
+    said = {
+        name: view.locator(f'.control[data-name="{name}"] .effect').inner_text()
+        for name in ("gfor38.pod_p.T_S1", "gfor38.pod_p.T_S2")
+    }
+    chosen = view.inner_text("#movers > p")
+    assert abs(other - held["movers"]["frequency_hz"]) > 0.1
+    assert re.search(
+        rf"; then another mode is damped least: ≈ \d+\.\d\d % at {other:.3f} Hz$",
+        said["gfor38.pod_p.T_S1"],
+    )
+    assert "another" not in said["gfor38.pod_p.T_S2"]  # the mode shown is damped less
+    assert "By ∂λ/∂p of the running FMUs: " in chosen
+    assert chosen.endswith("40 of 192 values were looked at.")
+
+
 def test_a_typed_value_that_was_not_computed_is_told_with_the_one_that_is_shown(window):
     """400 once became 447.2, and −5 the least of the grid, without a word."""
     view = window(viewport={"width": 1280, "height": 900})

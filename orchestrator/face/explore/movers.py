@@ -17,6 +17,7 @@ _OF_NETWORK = (
 )
 _LARGE = 600  # states from which on the network's values are left out
 _RATIO = 5.0  # a slider goes up to so many times the value, and down to such a part of it
+_GAIN = ".K"  # end of the name of a controller's gain
 _NO_EFFECT = 1e-6  # |Δλ| for one percent of a value, as a part of |λ|, below which it moves nothing
 
 Say = Callable[[dict[str, Any]], None]
@@ -49,7 +50,7 @@ def movers(
     dict
         ``movers`` (see `_as_json`; at most `MOST`, those that move the mode furthest for the same percentage; first
         the one whose step moves damping most, those with doubts last), ``frequency_hz`` and ``damping_percent`` of the
-        mode, ``looked_at`` and ``of``: how many values were looked at, and how many could be.
+        mode, ``looked_at`` and ``of``: how many values were looked at, and how many could be; ``gains``: see `_gains`.
 
     Raises
     ------
@@ -79,6 +80,18 @@ def movers(
         "damping_percent": found.mode.damping_percent,
         "looked_at": len(wanted),
         "of": len(of),
+        "gains": _gains(found.rows),
+    }
+
+
+def _gains(rows: Sequence[Sensitivity]) -> dict[str, float]:
+    """By how many points of damping the mode would move without each gain that was looked at, to first order.
+
+    Which controller the page asks about follows from it: the first by name may have no part in the mode."""
+    return {
+        row.parameter.name: abs(row.parameter.value * row.damping_per_unit)
+        for row in rows
+        if row.parameter.name.endswith(_GAIN) and row.damping_per_unit is not None
     }
 
 

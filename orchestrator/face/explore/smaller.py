@@ -1,13 +1,16 @@
 """Answers as a saved page holds them: what it draws, with the digits that it shows."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from decimal import ROUND_05UP, Context
 from typing import Any
 
 _DIGITS = 6  # significant ones of a number, as many as the page shows
 _OF_MODES = 10
 """Significant digits of a mode's figures, which the page rounds to those of the command: twice rounded is wrong."""
 _FIGURES = ("real", "imag", "frequency_hz", "damping_percent")
-_OF_SHARES = 3  # significant digits of participations and shapes
+_OF_SHARES = Context(prec=4, rounding=ROUND_05UP)
+"""Significant digits of participations and shapes, one more than the page shows. Cut off, with a last digit that tells
+of what was cut: the page then rounds as it does the figure itself, where 65.47 % in three digits became 66 %."""
 _STATES = 7  # of a mode's participation; the page has bars for eight at most
 _COMPONENTS = 6  # of a mode's participation
 _SEEN = 0.02  # an arrow shorter than this part of the longest is not drawn
@@ -55,17 +58,25 @@ def _smaller_mode(mode: Mapping[str, Any]) -> dict[str, Any]:
     }
     figures = {key: mode[key] for key in _FIGURES if key in mode}
     others = {key: one for key, one in mode.items() if key != _UNDRAWN}
-    return {**rounded(others), **rounded(figures, _OF_MODES), **rounded(drawn, _OF_SHARES)}
+    return {**rounded(others), **rounded(figures, _OF_MODES), **_rewritten(drawn, _cut)}
+
+
+def _cut(share: float) -> float:
+    return float(_OF_SHARES.create_decimal_from_float(share))
 
 
 def rounded(content: Any, digits: int = _DIGITS) -> Any:
     """The same content, each number with as many digits as a page needs."""
+    return _rewritten(content, lambda number: float(f"{number:.{digits}g}"))
+
+
+def _rewritten(content: Any, write: Callable[[float], float]) -> Any:
     if isinstance(content, float):
-        return float(f"{content:.{digits}g}")
+        return write(content)
     if isinstance(content, Mapping):
-        return {key: rounded(one, digits) for key, one in content.items()}
+        return {key: _rewritten(one, write) for key, one in content.items()}
     if isinstance(content, list | tuple):
-        return [rounded(one, digits) for one in content]
+        return [_rewritten(one, write) for one in content]
     return content
 
 

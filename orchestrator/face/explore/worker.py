@@ -37,6 +37,7 @@ from orchestrator.studies.operating_points.bench import PointBench
 from orchestrator.studies.operating_points.item import Item
 from orchestrator.studies.operating_points.line_ends import lines_with_ends
 from orchestrator.studies.operating_points.preparation import ItemPreparation
+from orchestrator.studies.runs.answer_of_modes import swing_in_words
 
 _SHOWN = 3  # lines that a message names
 _CHANGE = 2e-3  # of the parameter, in parts of its value, or of 1 where that is 0
@@ -284,9 +285,7 @@ class Desk:
             "rated_hz": hidden and hidden.rated_hz,
             "warnings": [*_questions(scenario), *modes.result.unasked],
             "idle": idle,
-            "swings": [
-                [*modes.result.swing_of(mode), modes.result.in_between(mode)] for mode in modes
-            ],
+            "swings": [swing_in_words(modes.result, mode) for mode in modes],
             "copied": copied(
                 case.file,
                 self._word,

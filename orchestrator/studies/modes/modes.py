@@ -153,17 +153,12 @@ class ModesResult:
     def swing_of(self, mode: spectra.Mode) -> tuple[list[str], list[str]]:
         """Components that swing together in a mode, and those that swing against them; each largest first.
 
-        Those at an angle in between are in neither: `in_between` has them."""
+        Those at an angle in between are in neither."""
         groups = mode.swing_groups(self.swing)
         together, against = (
             [s.partition(".")[0] for s in side] for side in (groups.together, groups.against)
         )
         return together, against
-
-    def in_between(self, mode: spectra.Mode) -> dict[str, float]:
-        """Components that swing neither with the largest one nor against it, with their angles to it [degrees]."""
-        between = mode.swing_groups(self.swing).between
-        return {state.partition(".")[0]: angle for state, angle in between.items()}
 
 
 def compute_modes(

@@ -107,5 +107,9 @@ def with_misfits(result: ModesResult, remark: str) -> str:
 
 
 def swing_of(result: ModesResult, mode: Mode) -> str:
-    said = mode.swing_groups(result.swing).words(lambda side: first_few(side, str))
-    return said or ", ".join(state for state, _ in mode.participation[:2])
+    return swing_in_words(result, mode) or ", ".join(state for state, _ in mode.participation[:2])
+
+
+def swing_in_words(result: ModesResult, mode: Mode) -> str:
+    """Who swings against whom, the first of many named; "" if nothing swings."""
+    return mode.swing_groups(result.swing).words(lambda side: first_few(side, str))

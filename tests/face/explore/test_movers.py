@@ -4,8 +4,9 @@ import pytest
 
 import orchestrator as gfor
 from orchestrator.core.errors import InputError
-from orchestrator.face.explore.movers import candidates, grid_of, movers
-from orchestrator.studies.sensitivities.parameters import round_step
+from orchestrator.face.explore.movers import _gains, candidates, grid_of, movers
+from orchestrator.studies.sensitivities.parameters import Parameter, round_step
+from orchestrator.studies.sensitivities.sensitivities import Sensitivity
 
 RANGE = (0.1, 2.0)
 
@@ -81,6 +82,23 @@ def test_in_a_large_case_the_devices_that_take_part_and_the_network_beside_them_
         x.variable("X") for x in scenario.prepared.network.lines if bus in (x.from_bus, x.to_bus)
     ]
     assert near[0].removeprefix("grid.") in beside
+
+
+def test_a_gain_is_weighed_by_what_the_mode_has_without_it():
+    """The first gain by name, of a converter without a part in the mode, was once asked about."""
+    rows = [
+        Sensitivity(Parameter(*row[:2], "1", row[2], tunable=True), -0.1 + 9j, row[3], None, "")
+        for row in (
+            ("gfor30", "pod_p.K", 200.0, 0j),
+            ("gfor31", "pod_p.K", 200.0, -1e-3 + 0j),
+            ("gfor31", "pod_p.T_f", 0.1, 1 + 0j),
+            ("gfor32", "pod_p.K", 200.0, None),
+        )
+    ]
+    gains = _gains(rows)
+    assert gains["gfor30.pod_p.K"] == 0
+    assert gains["gfor31.pod_p.K"] == pytest.approx(100 * 200 * 1e-3 / 9, rel=1e-3)  # points
+    assert list(gains) == ["gfor30.pod_p.K", "gfor31.pod_p.K"]
 
 
 @pytest.mark.parametrize(("size", "step"), [(20, 20), (0.037, 0.05), (0.1, 0.1), (8.7e3, 1e4)])

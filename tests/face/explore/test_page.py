@@ -167,6 +167,8 @@ def test_the_first_screen_has_the_answer_its_shape_five_sliders_and_a_response(b
     assert "0.763 Hz, 22.55 %" in view.locator("#verdict").inner_text()
     assert view.locator("#table tr.chosen td").first.inner_text() == "0.7633"
     view.locator("#first-plot .curve").wait_for(state="attached")
+    field = view.locator("#search")
+    assert field.evaluate("x => x.placeholder.length * 8 < x.clientWidth")  # none is cut off
     view.locator("#movers .control").first.wait_for()
     assert view.locator("#network #arrows .arrow").count() == 2
     assert view.locator("#movers input[type=range]").count() == 5
@@ -572,6 +574,28 @@ def test_a_drift_of_the_common_speed_is_told_as_one(view):
     assert told == "the common speed drifts at +0.021 1/s without a governor, all machines alike"
     other = view.evaluate("verdict => growthOf(verdict)", verdict | {"common_speed": []})
     assert other == "a mode grows at +0.021 1/s (no oscillation, in sg1)"
+
+
+@needs_chromium
+def test_questions_are_about_the_gain_that_moves_the_mode_most(view):
+    """The first by name once was, of a converter that has no part in the mode."""
+    asked = view.evaluate(
+        """() => {
+            const one = name => ({ parameter: `${name}.pod_p.K`, variability: "tunable", value: 200, switches: [] });
+            seen.info = { ...seen.info, parameters: ["gfor30", "gfor31", "gfor32"].map(one) };
+            seen.moversOf = state.scenario;
+            const of = gains => {
+                seen.movers = { gains };
+                const { gain, none } = gainToAsk();
+                return [gain.parameter, none];
+            };
+            seen.modes = [{ damping_percent: 1, components: { gfor32: 0.1 } }];
+            const moved = of({ "gfor30.pod_p.K": 0, "gfor31.pod_p.K": 0.3 });
+            return [moved, of({ "gfor30.pod_p.K": 0.001, "gfor31.pod_p.K": 0 }), of({})];
+        }"""
+    )
+    none = " (none that was looked at moves this mode by more than a rounding)"
+    assert asked == [["gfor31.pod_p.K", ""], ["gfor30.pod_p.K", none], ["gfor32.pod_p.K", ""]]
 
 
 @needs_chromium

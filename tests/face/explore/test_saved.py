@@ -186,6 +186,19 @@ def test_a_smaller_answer_has_the_figures_that_are_shown():
     assert [one["modes"]["scenarios"][0]["power_flow"] for one in (first, second)] == [0, 0]
 
 
+@pytest.mark.parametrize("share", [0.6547218, 0.2747361, 0.12496, 0.0544996, 0.655, 0.6550002])
+def test_a_share_is_rounded_once(share):
+    """65.47 % once became 65.5 % in the page's content, and 66 % in what it shows."""
+    answer = answer_of(-0.1 + 3j)
+    (mode,) = answer["modes"]["scenarios"][0]["modes"]
+    mode |= {"components": {"a": share}, "participation": [{"state": "a.x", "factor": share}]}
+    (kept,) = smaller_answer(answer, [])["modes"]["scenarios"][0]["modes"]
+    for held in (kept["components"]["a"], kept["participation"][0]["factor"]):
+        assert len(str(held)) <= len("0.12345") + (share < 0.1)
+        for digits in (2, 3):  # a percent, and a tenth of it
+            assert f"{held:.{digits}f}" == f"{share:.{digits}f}"
+
+
 def test_of_many_parameters_a_page_keeps_those_of_its_sliders_and_what_is_off():
     rows = [{"parameter": f"a.p{k}", "value": 1.0, "switches": []} for k in range(2000)]
     rows += [{"parameter": "line.closed", "value": False, "switches": []}]

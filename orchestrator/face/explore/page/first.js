@@ -46,7 +46,10 @@ async function findMovers(key) {
   const said = make("span"), found = await ask(MOVERS_WORK, { ask: "movers", ...theCase(), range: state.range, components: least.components, names: known }, said);
   if (found === undefined || key !== seen.firstOf) return;
   seen.moversReason = found?.reason ?? said.textContent;
-  if (found?.movers) Object.assign(seen, { movers: found, moversOf: state.scenario, moversAgain: known.length > 0 });
+  if (found?.movers) {
+    found.gains = { ...(known.length ? seen.movers.gains : {}), ...found.gains };  // anew, only the sliders' values are looked at
+    Object.assign(seen, { movers: found, moversOf: state.scenario, moversAgain: known.length > 0 });
+  }
   seen.moversStale = false;
   paintMovers();
   paintQuestions();
@@ -55,8 +58,24 @@ const signed = (x, digits) => `${x < 0 ? "−" : "+"}${+Math.abs(x).toPrecision(
 // A round step, and what it does to first order.
 function effectOf(one) {
   const unit = one.unit === "1" ? "" : ` ${one.unit}`;
-  return `${signed(one.step, 3)}${unit} → ${signed(one.points, 2)} points of damping, ${signed(one.hertz, 2)} Hz${one.doubts.length ? ` (doubtful: ${one.doubts[0]})` : ""}`;
+  return `${signed(one.step, 3)}${unit} → ${signed(one.points, 2)} points of damping, ${signed(one.hertz, 2)} Hz${anotherWithin(one)}${one.doubts.length ? ` (doubtful: ${one.doubts[0]})` : ""}`;
 }
+// Which other mode is the least damped one where a saved page's slider has made its step, if one is.
+function anotherWithin({ parameter, value, step }) {
+  const end = value + step, grid = SAVED?.grid[parameter];
+  if (!grid) return "";
+  const modesAt = x => answerWith(parameter, x)?.modes.scenarios[0].modes ?? [], own = modesAt(ownOf(parameter)), first = leastOf(own);
+  const said = (least, before, about) => (least && before && least !== before ? `; then another mode is damped least: ${about}${fixed(least.damping_percent, 2)} % at ${fixed(least.frequency_hz, 3)} Hz` : "");
+  const sameIn = modes => modes[partnersIn(modes, own).indexOf(first)];  // the mode that is shown, where it is recognised
+  if (grid.includes(end)) return said(leastOf(modesAt(end)), sameIn(modesAt(end)), "");
+  const cell = cellAround({ [parameter]: end });
+  if (!cell) return "";
+  const corner = SAVED.answers[cell.corners[0]].answer.modes.scenarios[0].modes, shown = corner.indexOf(sameIn(corner));
+  const between = betweenOf(cell, { [parameter]: end }).map(m => ({ damping_percent: m.damping, frequency_hz: m.hz }));
+  return said(leastOf(between), between[cell.modes.findIndex(one => one[0] === shown)], "≈ ");
+}
+// By which rule the sliders were chosen, and of how many values.
+const wordsOfChoice = ({ looked_at, of }) => `By ∂λ/∂p of the running FMUs: the values that move frequency and damping furthest for the same percentage, first the one whose step moves damping most${looked_at < of && !seen.moversAgain ? `; ${looked_at} of ${of} values were looked at` : ""}.`;
 // The sliders are made `anew` where values were set; else only their sentences change, so that none is lost in a drag.
 function paintMovers(anew = false) {
   const known = seen.moversOf === state.scenario ? seen.movers : null, of = known && `${fixed(known.frequency_hz, 3)} Hz, ${fixed(known.damping_percent, 2)} %`;
@@ -74,7 +93,7 @@ function paintMovers(anew = false) {
   if (SAVED && !SAVED.movers) { $("movers-title").hidden = true; return; }
   if (!known) parts.push(make("p", { class: "soft" }, seen.moversReason || "The FMUs are being asked which values move this mode most …"));
   else if (!known.movers.length) parts.push(make("p", { class: "soft" }, seen.moversReason || `None of ${known.looked_at} values moves this mode.`));
-  else parts.push(make("p", { class: "soft" }, SAVED ? "Each slider moves alone, over values that were computed. " : `By ∂λ/∂p of the running FMUs: the values that move frequency and damping furthest for the same percentage, first the one whose step moves damping most${known.looked_at < known.of && !seen.moversAgain ? `; ${known.looked_at} of ${known.of} values were looked at` : ""}. `, seen.moversAgain && !SAVED ? again : null));
+  else parts.push(make("p", { class: "soft" }, `${SAVED ? "Each slider moves alone, over values that were computed. " : ""}${wordsOfChoice(known)} `, seen.moversAgain && !SAVED ? again : null));
   const boxes = parts.slice(0, shown.length);
   if (boxes.some((box, k) => $("movers").children[k] !== box) || $("movers").children.length !== parts.length) { $("movers").replaceChildren(...parts); return; }
   $("movers").lastElementChild.replaceWith(parts.at(-1));
@@ -153,9 +172,19 @@ function whatAModeIs() {
   const own = m ? ` This one swings ${number(m.frequency_hz, 3)} times a second; ${left < 1 ? `after each swing ${number(100 * left, 2)} % of it is left` : `each swing is ${number(left, 3)} times the last`}, which is a damping of ${fixed(m.damping_percent, 2)} %. Most of it is in ${Object.keys(m.components).slice(0, 2).join(" and ")}.` : "";
   sayElse(`A mode is one of the ways in which the system swings by itself after any disturbance, as a bell has its tones: it has a frequency, a damping, and a shape, which tells who swings against whom (the arrows).${own}`);
 }
+// The gain that moves the shown mode most, and what is said of it where none moves it; of those that were not looked at
+// the one whose device takes part most.
+const A_ROUNDING = 0.005;  // points of damping, which no figure of the page shows
+function gainToAsk() {
+  const all = (seen.info?.parameters ?? []).filter(p => /(^|\.)K$/.test(p.parameter) && p.variability === "tunable" && p.value);
+  const moves = (seen.moversOf === state.scenario ? seen.movers?.gains : null) ?? {}, shares = leastOf(seen.modes)?.components ?? {};
+  const acts = p => p.switches.every(one => (state.values[one] ?? original(one)) !== false), share = p => shares[p.parameter.split(".")[0]] ?? 0;
+  const gain = all.sort((a, b) => acts(b) - acts(a) || (moves[b.parameter] ?? 0) - (moves[a.parameter] ?? 0) || share(b) - share(a))[0];
+  const none = gain && acts(gain) && moves[gain.parameter] < A_ROUNDING;
+  return { gain, none: none ? " (none that was looked at moves this mode by more than a rounding)" : "" };
+}
 function paintQuestions() {
-  const movers = seen.moversOf === state.scenario ? seen.movers?.movers ?? [] : [], first = (movers.find(one => one.parameter.startsWith("grid.")) ?? movers[0])?.parameter, all = seen.info?.parameters ?? [];
-  const gains = all.filter(p => /(^|\.)K$/.test(p.parameter) && p.variability === "tunable" && p.value), gain = gains.find(p => p.switches.every(one => (state.values[one] ?? original(one)) !== false)) ?? gains[0];
+  const movers = seen.moversOf === state.scenario ? seen.movers?.movers ?? [] : [], first = (movers.find(one => one.parameter.startsWith("grid.")) ?? movers[0])?.parameter, { gain, none } = gainToAsk();
   const line = SAVED ? null : lineToLose(), long = seen.info?.diagram?.lines.find(l => l.length && original(l.length));
   const other = converterApart(), off = gain?.switches[0], questions = [];
   const add = (text, act) => { const button = make("button", {}, text); button.addEventListener("click", act); questions.push(button, " "); };
@@ -166,7 +195,7 @@ function paintQuestions() {
   if (!SAVED && other) add("What does the converter do?", () => withoutConverter(other));
   else if (!SAVED && off) {
     const on = (state.values[off] ?? original(off)) !== false;
-    add(`What does ${off.replace(/\.enabled$/, "")} do?`, () => withValues({ [off]: !on }, `${off} = ${!on}`));
+    add(`What does ${off.replace(/\.enabled$/, "")} do?${none}`, () => withValues({ [off]: !on }, `${off} = ${!on}`));
   }
   if (SAVED?.others) add("Which scenario damps most?", askBestScenario);
   const sliders = Object.keys(SAVED?.grid ?? {}), doubled = sliders.filter(isDoubled), twice = doubled.find(name => name.endsWith(".K")) ?? doubled[0];

@@ -53,7 +53,7 @@ function paintVerdict() {
   const one = seen.answer.modes.scenarios[0];
   $("verdict").className = one.stable === true ? "good" : one.stable === false ? "bad" : "";
   const least = leastOf(seen.modes), [low, high] = state.range;
-  const swing = least ? `least damped from ${number(low)} to ${number(high)} Hz: ${fixed(least.frequency_hz, 3)} Hz, ${fixed(least.damping_percent, 2)} % (${swingers(seen.modes.indexOf(least), 3) || Object.keys(least.components).slice(0, 2).join(", ")}${isOfDirectCurrents(least) ? "; direct currents of the network, no swing of machines" : ""})` : `no oscillation from ${number(low)} to ${number(high)} Hz`;
+  const swing = least ? `least damped from ${number(low)} to ${number(high)} Hz: ${fixed(least.frequency_hz, 3)} Hz, ${fixed(least.damping_percent, 2)} % (${swingers(seen.modes.indexOf(least)) || Object.keys(least.components).slice(0, 2).join(", ")}${isOfDirectCurrents(least) ? "; direct currents of the network, no swing of machines" : ""})` : `no oscillation from ${number(low)} to ${number(high)} Hz`;
   $("verdict").textContent = `${titleNow()}: ${one.stable === true ? "stable" : one.stable === false ? "UNSTABLE" : "not known"} (small-signal)${one.stable === false && !(least?.damping_percent < 0) ? ", by what grows besides (below)" : ""}; ${swing}`;
   paintOutside();
   $("wider").hidden = Boolean(SAVED) || !seen.answer.outside || state.range[1] >= 1000;

@@ -66,13 +66,7 @@ function bars(title, entries) {
   return [make("h3", {}, title), ...entries.map(([name, share]) => make("div", { class: "bar" }, make("span", {}, name), make("meter", { min: 0, max: 1, value: share, "aria-label": `${name} ${fixed(100 * share, 1)} %` }), make("span", {}, fixed(share, 2))))];
 }
 // Who swings against whom in the mode at a place, in the words of `gfor modes`.
-function swingers(place, most = 6) {
-  const [together, against, between = {}] = seen.answer.swings?.[place] ?? [[], []];
-  const few = units => `${units.slice(0, most).join(", ")}${units.length > most ? ` and ${units.length - most} more` : ""}`;
-  const others = few(Object.entries(between).map(([name, angle]) => `${name} ${angle > 0 ? "leads" : "lags"} by ${fixed(Math.abs(angle), 0)}°`));
-  const sides = [together, against].filter(side => side.length), alone = together.length === 1 && !against.length && !others;
-  return [sides.map(few).join(" against ") + (alone ? " alone" : ""), others].filter(Boolean).join("; ");
-}
+const swingers = place => seen.answer.swings?.[place] ?? "";
 let turning = null;
 function paintChosen() {
   cancelAnimationFrame(turning);
