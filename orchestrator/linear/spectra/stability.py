@@ -293,6 +293,11 @@ class Stability(NoTruth):
         }
 
 
+def drift_in_words(rate: float) -> str:
+    """Return what is said where the drift of the common speed is all that grows; ``rate`` in 1/s."""
+    return f"swings damped; the common speed drifts ({rate:+.2g} 1/s, no governor)"
+
+
 def zeros_in_words(zeros: int, states: Sequence[str] = ()) -> str:
     """Return what several zeros are, and the states in which they lie where these are known."""
     if zeros == 1:

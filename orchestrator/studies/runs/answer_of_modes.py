@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from orchestrator.linear.spectra.modes import Mode
-from orchestrator.linear.spectra.stability import Cause, Stability
+from orchestrator.linear.spectra.stability import Cause, Stability, drift_in_words
 from orchestrator.output.report.short_texts import first_few
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.runs.answer import ScenarioAnswer
@@ -50,8 +50,7 @@ def _remark(result: ModesResult, mode: Mode | None) -> str:
     if verdict.stable or verdict.mode is None:
         return swing
     if verdict.only_common_speed:
-        rate = verdict.mode.eigenvalue.real
-        drift = f"swings damped; the common speed drifts ({rate:+.2g} 1/s, no governor)"
+        drift = drift_in_words(verdict.mode.eigenvalue.real)
         return f"{drift}; {swing}" if swing else drift
     place = _outside(result, verdict.mode)
     who = _who_grows(result, verdict.mode) if place else ""

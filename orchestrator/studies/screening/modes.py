@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from orchestrator.core.arrays import Vector
 from orchestrator.core.errors import AnalysisError
 from orchestrator.core.threads import one_thread
+from orchestrator.linear.doubts.common_speed import is_common_speed
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.critical_modes import DENSE, find_critical_modes, nearest_pairs
 from orchestrator.linear.spectra.growth_search import SLOWEST, find_growing_modes
@@ -20,10 +21,12 @@ from orchestrator.linear.spectra.modes import (
     damping_ratio,
     eigenvalues,
     find_spectrum,
+    make_mode,
 )
 from orchestrator.linear.spectra.shifted_equations import GROWING, ShiftedEquations, count_growing
 from orchestrator.linear.spectra.stability import grows
 from orchestrator.studies.modes.modes import is_swing
+from orchestrator.studies.modes.naming import matching
 
 _BEYOND = 1.3
 """Modes are followed a little beyond the range and the damping that are asked for, so that those which enter are known
@@ -90,6 +93,8 @@ class FoundModes:
     # whether swings of machines were looked for above the range, up to `LOCAL_HZ`, and the least damped one
     looked_above: bool = False
     above: Mode | None = None
+    # whether the fastest of those that grow elsewhere is the drift of the common speed
+    drifts: bool = False
 
     def critical(self, wanted: CriticalRegion) -> list[int]:
         held = [k for k, value in enumerate(self.modes.eigenvalues.tolist()) if wanted.holds(value)]
@@ -113,7 +118,8 @@ def find_modes_here(
 
     ``alone``: eigenvalues of the components alone [rad/s], as `count_growing` takes them.
     ``neighbour``: modes of a similar operating point; None searches from scratch.
-    ``speeds``: patterns of the states that swing with machines, for what lies above the range of a small system.
+    ``speeds``: patterns of the states that swing with machines, for what lies above the range of a small system, and
+    for the drift of the common speed.
     ``count``: whether all growing eigenvalues are counted, at any frequency. Small systems always are.
     Raises an `AnalysisError` if neither the search nor the growth that is counted comes to an end, and the system is
     too large for all of its eigenvalues."""
@@ -124,14 +130,14 @@ def find_modes_here(
     searched = found is None
     if found is None:
         if len(model.names) <= MOST_COUNTED:
-            return replace(_whole(model, wanted), looked_above=False)
+            return replace(_whole(model, wanted, speeds), looked_above=False, above=None)
         found = _from_search(model, equations, wanted)
     if not count:
         return FoundModes(found, searched, None)
     if len(model.names) <= MOST_COUNTED:
-        return _counted_among_all(model, found, searched=searched)
+        return _with_drift(model, _counted_among_all(model, found, searched=searched), speeds)
     if model.is_searched_in_blocks:
-        return _counted_by_search(model, found, searched=searched)
+        return _with_drift(model, _counted_by_search(model, found, searched=searched), speeds)
     zeros, slow = _near_zero(model, found)
     return FoundModes(
         found, searched, _elsewhere(equations, alone, found) + slow, None, zeros, GROWING
@@ -211,7 +217,25 @@ def _whole(model: LinearModel, wanted: CriticalRegion, speeds: Sequence[str] = (
         if wanted.highest_hz < mode.frequency_hz <= LOCAL_HZ and is_swing(mode, speeds)
     ]
     above = min(higher, key=lambda mode: mode.damping_percent, default=None)
-    return replace(found, looked_above=True, above=above)
+    rightmost = spectrum.rightmost
+    drifts = (
+        rightmost is not None
+        and rightmost.eigenvalue == found.fastest
+        and is_common_speed(rightmost, matching(model.names, speeds))
+    )
+    return replace(found, looked_above=True, above=above, drifts=drifts)
+
+
+def _with_drift(model: LinearModel, found: FoundModes, speeds: Sequence[str]) -> FoundModes:
+    """The same, told whether what grows fastest beside the modes is the drift of the common speed."""
+    if found.fastest is None or found.fastest.imag or not speeds:
+        return found
+    beside = complex(
+        found.fastest.real + _BESIDE_ZERO
+    )  # at an eigenvalue itself nothing can be solved
+    ((value, left, right),) = nearest_pairs(model.coupled, beside, 1)
+    mode = make_mode(complex(value.real), left, right, model.names)
+    return replace(found, drifts=is_common_speed(mode, matching(model.names, speeds)))
 
 
 def _counted_among_all(model: LinearModel, modes: ModeSet, *, searched: bool) -> FoundModes:

@@ -302,6 +302,7 @@ class _Worker:
                 None if result.stability.stable is None else elsewhere,
                 None if fastest is None else fastest.eigenvalue,
                 result.stability.zeros,
+                drifts=bool(elsewhere and result.stability.common_speed),
             )
             warnings = (*warnings, *result.warnings)
             record = self._item_record(found, {}, point.residual, warnings, certain=True)
@@ -346,6 +347,7 @@ class _Worker:
             counted=counted,
             growing_elsewhere=found.growing_elsewhere or 0,
             fastest=None if found.fastest is None else (found.fastest.real, found.fastest.imag),
+            drifts=found.drifts,
             searched=found.searched,
             zeros=found.zeros,
             slowest=found.slowest,

@@ -81,6 +81,8 @@ class ItemRecord:
     growing_elsewhere: int = 0
     # real and imaginary part [rad/s] of the one of them that grows fastest; None where they were only counted
     fastest: tuple[float, float] | None = None
+    # whether that one is the drift of the common speed, which no governor holds
+    drifts: bool = False
     # whether the modes come from a search of their own rather than from a neighbour's
     searched: bool = False
     # number of eigenvalues that are zero, where growth was counted: one may be the free angle, others are a frequency

@@ -13,7 +13,7 @@ from orchestrator.core.options import Option, command
 from orchestrator.core.spelling import Text
 from orchestrator.linear.spectra.critical_modes import DENSE
 from orchestrator.linear.spectra.shifted_equations import GROWING
-from orchestrator.linear.spectra.stability import zeros_in_words
+from orchestrator.linear.spectra.stability import drift_in_words, zeros_in_words
 from orchestrator.output.report.verdict_sentence import VerdictSentence
 from orchestrator.studies.operating_points.item import Status
 from orchestrator.studies.operating_points.line_ends import LineEnd
@@ -51,11 +51,14 @@ class OutageRow:
 def _rank(item: ScreenedItem) -> tuple[bool, float, float]:
     """Return a key that puts unstable items first, the fastest growth first, and then those with the least damping.
 
-    Growth beside the critical modes counts as well: a voltage that runs away has no damping ratio."""
+    Of those where the common speed alone drifts, the swings are judged. Growth beside the critical modes counts too:
+    a voltage that runs away has no damping ratio."""
     least = least_of(item)
     damping = least.damping if least else np.inf
     if item.record.stable is not False:
         return True, 0.0, damping
+    if only_drifts(item.record):
+        return False, 0.0, damping
     return False, -_fastest_growth(item.record), damping
 
 
@@ -185,11 +188,15 @@ def verdict_sentence(summary: Summary) -> str:
 def verdict_of(summary: Summary) -> VerdictSentence:
     total, planned = len(summary.result.items), summary.result.plan.number_of_items
     if summary.unstable:
+        drifting = [item for item in summary.unstable if only_drifts(item.record)]
+        if len(drifting) == len(summary.unstable):
+            return _drift_alone(summary)
         worst = min(summary.unstable, key=_rank)
         told = (not_judged(summary), runs_sentence(summary), summary.beyond, _widened(summary))
         lost = "".join(f"; {text}" for text in told if text)
         at = f"at {counted_items(len(summary.unstable), total, planned)}; worst: {where(summary, worst)}"
-        text = f"{at}{_least(worst)}{lost}"
+        rest = f"; at {len(drifting)} of them only the common speed drifts" if drifting else ""
+        text = f"{at}{_least(worst)}{rest}{lost}"
         return VerdictSentence(False, "UNSTABLE", text)
     if summary.gone_wrong:
         text = f"in {len(summary.gone_wrong)} of {len(summary.runs)} runs of outages, though no mode grows"
@@ -227,6 +234,18 @@ def verdict_of(summary: Summary) -> VerdictSentence:
     missing += [f"what relays leave at {tripping} of them is not judged"] if tripping else []
     known = f"nothing grows at {counted_items(computed, total, planned)}, but " if computed else ""
     return VerdictSentence(None, "not known", f"{known}{', '.join(missing)}{tail}")
+
+
+def _drift_alone(summary: Summary) -> VerdictSentence:
+    """The verdict where the drift of the common speed is all that grows: the swings are judged apart from it."""
+    total, planned = len(summary.result.items), summary.result.plan.number_of_items
+    fastest = max(summary.unstable, key=lambda item: _fastest_growth(item.record))
+    rate, at = _fastest_growth(fastest.record), counted_items(len(summary.unstable), total, planned)
+    most = f", the fastest {where(summary, fastest)}" if len(summary.unstable) > 1 else ""
+    told = (not_judged(summary), runs_sentence(summary), summary.beyond, _widened(summary))
+    rest = "".join(f"; {text}" for text in told if text)
+    text = f"at {at}: {drift_in_words(rate)}{most}{_least_of_all(summary)}{rest}"
+    return VerdictSentence(False, "UNSTABLE", text)
 
 
 def _widened(summary: Summary) -> str:
@@ -377,7 +396,8 @@ def _but_slowly(summary: Summary) -> str:
 
 def _least(item: ScreenedItem) -> str:
     """Tell the least damped critical mode, unless it is damped and another grows, and what grows beside it."""
-    outside, one = growth_outside(item.record), least_of(item)
+    outside = "" if only_drifts(item.record) else growth_outside(item.record)
+    one = least_of(item)
     parts = [outside] if outside else []
     if one is not None and (one.damping < 0 or not outside):
         who = ", ".join(f"{name} {share:.2f}" for name, share in one.participation(2))
@@ -393,7 +413,8 @@ def growth_outside(record: ItemRecord) -> str:
     text = f"{number} eigenvalue{'s grow' if number > 1 else ' grows'} outside of the range"
     if fastest is None:
         return f"{text}; `gfor modes` shows how fast"
-    return f"{text}, {'the fastest ' if number > 2 else ''}by {_rate(fastest)}"
+    rate = _rate(fastest, drifts=record.drifts)
+    return f"{text}, {'the fastest ' if number > 2 else ''}by {rate}"
 
 
 def growth_in_short(record: ItemRecord) -> str:
@@ -401,7 +422,15 @@ def growth_in_short(record: ItemRecord) -> str:
     number, fastest = _growing(record)
     if not number:
         return ""
-    return "how fast is not known" if fastest is None else f"+{_rate(fastest)}"
+    if fastest is None:
+        return "how fast is not known"
+    return f"+{_rate(fastest, drifts=record.drifts)}"
+
+
+def only_drifts(record: ItemRecord) -> bool:
+    """Return whether the drift of the common speed is all that grows, so that every swing is damped."""
+    swings = record.eigenvalues[list(record.critical)]
+    return record.drifts and _growing(record)[0] == 1 and not (swings.real > UNSTABLE).any()
 
 
 def _growing(record: ItemRecord) -> tuple[int, complex | None]:
@@ -416,6 +445,8 @@ def _growing(record: ItemRecord) -> tuple[int, complex | None]:
     return number, max(known, key=lambda value: value.real, default=None)
 
 
-def _rate(value: complex) -> str:
+def _rate(value: complex, *, drifts: bool) -> str:
+    if drifts:
+        return f"{value.real:.3g} 1/s: the common speed"
     at = f"at {value.imag / (2 * np.pi):.3g} Hz" if value.imag else "without an oscillation"
     return f"{value.real:.3g} 1/s {at}"

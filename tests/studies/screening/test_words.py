@@ -22,6 +22,7 @@ from orchestrator.studies.screening.view import as_json, overview, remarks
 from orchestrator.studies.screening.words import (
     above_the_range,
     by_outage,
+    growth_in_short,
     growth_outside,
     verdict_sentence,
     what_was_counted,
@@ -170,6 +171,53 @@ def test_a_swing_that_grows_is_told_before_what_grows_beside_it(screened):
     swing = "0.752 Hz, -4.95 % (sg2 0.70, sg3 0.19)"
     beside = "1 eigenvalue grows outside of the range, by 0.0819 1/s without an oscillation"
     assert f": {swing}, and {beside}" in sentence
+
+
+def drifting(item, rate, swing):
+    """An item where the common speed drifts at a rate [1/s] beside one swing [rad/s]."""
+    record = replace(
+        item.record,
+        stable=False,
+        eigenvalues=np.array([swing]),
+        critical=(0,),
+        shares={"sg2": np.array([0.7]), "sg3": np.array([0.19])},
+        growing_elsewhere=1,
+        fastest=(rate, 0.0),
+        drifts=True,
+        reactive="",
+        beyond={},
+    )
+    return replace(item, record=record, trajectories=(0,))
+
+
+def test_a_drift_of_the_common_speed_alone_is_told_apart_from_the_swings(screened):
+    """Of a case without governors all points were "UNSTABLE" by an eigenvalue without a name."""
+    first, second = screened.items
+    both = [drifting(first, 0.038, -0.2 + 8j), drifting(second, 0.108, -0.4 + 9j)]
+    summary = Summary(replace(screened, items=both))
+    assert verdict_sentence(summary) == (
+        "UNSTABLE: at 2 of 2 points and outages: swings damped; the common speed drifts (+0.11 1/s, no governor), the "
+        "fastest out, intact; least damped: in, intact: 1.273 Hz, 2.50 % (sg2 0.70, sg3 0.19)"
+    )
+    assert growth_in_short(both[1].record) == "+0.108 1/s: the common speed"
+    mixed = [both[0], drifting(second, 0.01, 0.3 + 9j)]
+    sentence = verdict_sentence(Summary(replace(screened, items=mixed)))
+    assert (
+        "worst: out, intact: 1.432 Hz, -3.33 % (sg2 0.70, sg3 0.19), and 1 eigenvalue" in sentence
+    )
+    assert "; at 1 of them only the common speed drifts" in sentence
+
+
+def test_the_drift_of_a_case_without_governors_is_known_as_that_of_its_modes():
+    found = face.load("wscc9").screen()
+    (item,) = found.result.items
+    stability = face.load("wscc9").scenario("base").modes().stability
+    assert stability.only_common_speed
+    assert item.record.drifts
+    assert (
+        f"the common speed drifts ({stability.largest_growth_rate:+.2g} 1/s, no governor)"
+        in str(found.verdict)
+    )
 
 
 def test_what_was_searched_in_the_range_alone_is_not_stable(screened):
