@@ -8,8 +8,9 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Sequence
-from contextlib import suppress
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,8 +32,11 @@ LARGEST_ANSWER = 64 * 1024**2
 _REFUSAL = re.compile(r"^(?:gfor [^\n:]*: )?error: ", re.MULTILINE)
 """The begin of a refusal, after the usage, remarks and questions that a command may have printed."""
 
-_turn = threading.Lock()
-"""Questions take turns: each may use all cores, and they write into one folder."""
+_turns = threading.BoundedSemaphore(2)
+"""Questions that are answered at once: each may use all cores, but a small one is not stuck behind a large one."""
+
+_writing = threading.BoundedSemaphore(1)
+"""Questions that write take turns: they write into one folder."""
 
 
 class NoAnswerError(InputError):
@@ -82,18 +86,28 @@ def ask(words: Sequence[str], allowance: Allowance) -> Any:
     length = sum(map(len, words))
     if length > MOST_WORDS:
         raise NoAnswerError(f"the question has {length} characters; at most {MOST_WORDS} are taken")
-    if not _turn.acquire(timeout=allowance.seconds):
+    until = time.monotonic() + allowance.seconds
+    with (
+        _turn(_writing, until, allowance) if "--out" in words else nullcontext(),
+        _turn(_turns, until, allowance),
+    ):
+        return _ask(words, allowance)
+
+
+@contextmanager
+def _turn(one: threading.BoundedSemaphore, until: float, allowance: Allowance) -> Iterator[None]:
+    """Wait for a turn until a time; it ends with the block."""
+    if not one.acquire(timeout=max(0.0, until - time.monotonic())):
         raise NoAnswerError(
-            f"another question is being answered, for more than {allowance.seconds:g} s now; ask one after the other"
+            f"other questions are being answered, for more than {allowance.seconds:g} s now; ask one after the other"
         )
     try:
-        return _ask(words, allowance)
+        yield
     finally:
-        _turn.release()
+        one.release()
 
 
 def _ask(words: Sequence[str], allowance: Allowance) -> Any:
-    allowance.results.mkdir(parents=True, exist_ok=True)
     task = {
         "roots": [str(root) for root in allowance.roots],
         "results": str(allowance.results),
@@ -129,7 +143,8 @@ def _run(task: dict[str, Any], allowance: Allowance, temporary: Path) -> tuple[b
     process = subprocess.Popen(
         # -P: what lies in the folder of results is no module
         [sys.executable, "-P", "-m", "orchestrator.face.cli.within", json.dumps(task)],
-        cwd=allowance.results,
+        # the folder of results is there once something is written
+        cwd=allowance.results if allowance.results.is_dir() else temporary,
         env=os.environ | own,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,

@@ -8,13 +8,16 @@ from typing import Any, ParamSpec, TypeVar
 from mcp.server import MCPServer
 from mcp.server.mcpserver import Context
 from mcp.server.mcpserver.exceptions import ToolError, UnexpectedToolError
+from mcp.server.stdio import stdio_server
 from mcp.types import CallToolResult, InputRequiredResult, Tool, ToolAnnotations
 from pydantic import ValidationError
 
 from orchestrator.core.errors import CosimError
 from orchestrator.face.agents.question import Allowance
+from orchestrator.face.agents.streams import Incoming, Open, Outgoing
 from orchestrator.face.agents.verbs import VERBS, Verbs
 
+_TIMES = 2.0  # a question may wait as long for its turn as it may take
 _SHOWN = 40  # characters of an unknown argument's name that an error repeats
 
 _P = ParamSpec("_P")
@@ -38,6 +41,7 @@ def make_server(allowance: Allowance) -> MCPServer[Any]:
     server = VerbServer(
         "gfor-cosim", instructions=_INSTRUCTIONS, version=version("gfor-cosim"), log_level="WARNING"
     )
+    server.patience = _TIMES * allowance.seconds
     verbs = Verbs(allowance)
     reading = ToolAnnotations(read_only_hint=True, open_world_hint=False)
     for name in VERBS:
@@ -48,7 +52,19 @@ def make_server(allowance: Allowance) -> MCPServer[Any]:
 
 
 class VerbServer(MCPServer[Any]):
-    """A server that refuses an argument which a verb has not, instead of an answer as if it were not given."""
+    """A server that refuses an argument which a verb has not, instead of an answer as if it were not given.
+
+    Once its input has ended, it answers what was asked until then, within ``patience`` [s]."""
+
+    patience = 0.0
+
+    async def run_stdio_async(self) -> None:
+        """Serve until the client has ended and has its answers."""
+        async with stdio_server() as (incoming, outgoing):
+            questions, server = Open(self.patience), self._lowlevel_server
+            told = Outgoing(outgoing, questions)
+            heard = Incoming(incoming, outgoing, questions)
+            await server.run(heard, told, server.create_initialization_options())
 
     async def list_tools(self) -> list[Tool]:
         """List the verbs; the schemas of their arguments are closed."""

@@ -4,6 +4,8 @@ import io
 import json
 import subprocess
 import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import chdir, redirect_stderr, redirect_stdout, suppress
 
 import pytest
@@ -92,7 +94,7 @@ def here(monkeypatch):
     def run(task, allowance, temporary):
         out, err = io.StringIO(), io.StringIO()
         told = redirect_stdout(out), redirect_stderr(err)
-        with chdir(task["results"]), told[0], told[1], suppress(SystemExit):  # argparse's way out
+        with chdir(temporary), told[0], told[1], suppress(SystemExit):  # argparse's way out
             main(task["words"])
         return out.getvalue().encode(), err.getvalue().encode()
 
@@ -182,6 +184,35 @@ def test_each_of_two_servers_writes_into_its_own_folder(tmp_path, monkeypatch):
             server.run_summary("two_area", "base")
     results = tmp_path / "results"
     assert written == [str(results / name) for name in ("run", "server_2/run", "run")]
+
+
+def test_a_small_question_is_not_stuck_behind_a_large_one_and_makes_no_folder(
+    tmp_path, monkeypatch
+):
+    """Questions that write still take turns."""
+    at_work, most, both = [], [], threading.Barrier(2, timeout=10)
+
+    def run(task, allowance, temporary):
+        writes = "--out" in task["words"]
+        at_work.append(writes)
+        most.append(at_work.count(True))
+        if not writes:
+            both.wait()
+        at_work.remove(writes)
+        return b"1", b""
+
+    monkeypatch.setattr(question, "_run", run)
+    asked = [["modes"], ["scr"], ["run", "--out", "a"], ["screen", "--out", "b"]]
+    with ThreadPoolExecutor() as threads:
+        assert [*threads.map(lambda words: ask(words, allowance(tmp_path)), asked)] == [1] * 4
+    assert max(most) == 1
+    assert not (tmp_path / "results").exists()
+
+
+def test_who_waits_too_long_for_a_turn_is_told(tmp_path, monkeypatch):
+    monkeypatch.setattr(question, "_turns", threading.BoundedSemaphore(1))
+    with question._turns, pytest.raises(NoAnswerError, match=r"for more than 0\.01 s now"):
+        ask(["modes"], allowance(tmp_path, 0.01))
 
 
 def test_a_question_ends_in_time(tmp_path):

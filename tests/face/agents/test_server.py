@@ -1,5 +1,7 @@
 """``gfor mcp``, asked by the client of the official library, over the standard streams of a process."""
 
+import json
+import subprocess
 import sys
 
 import anyio
@@ -60,6 +62,42 @@ def answers(tmp_path_factory):
         ("power_flow", {}),
         ("modes", {"case": "two_area"}),
     )
+
+
+def test_the_end_of_the_input_leaves_no_question_unanswered(tmp_path):
+    """Who wrote questions into a pipe got no answer to the last one; a line that is no JSON was dropped."""
+    asked = [
+        {
+            "id": 1,
+            "method": "initialize",
+            "params": {
+                "protocolVersion": "2025-06-18",
+                "capabilities": {},
+                "clientInfo": {"name": "pipe", "version": "1"},
+            },
+        },
+        {"method": "notifications/initialized"},
+        {"id": 2, "method": "tools/call", "params": {"name": "scr", "arguments": {"case": "no"}}},
+        {
+            "id": 3,
+            "method": "tools/call",
+            "params": {"name": "explain", "arguments": {"case": "two_area", "scenario": "no"}},
+        },
+    ]
+    lines = [json.dumps({"jsonrpc": "2.0", **one}) for one in asked]
+    found = subprocess.run(
+        [sys.executable, "-m", "orchestrator.face.cli", "mcp", "--root", str(tmp_path)],
+        input="\n".join([*lines, "{no JSON", "[1]", ""]),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    answers = [json.loads(line) for line in found.stdout.splitlines()]
+    errors = [one["error"]["code"] for one in answers if one["id"] is None]
+    assert sorted(one["id"] for one in answers if one["id"] is not None) == [1, 2, 3]
+    assert errors == [-32700, -32600]
+    assert "scenario" in str(next(one for one in answers if one["id"] == 3))
+    assert [*tmp_path.iterdir()] == []
 
 
 def test_every_verb_only_reads_and_has_a_schema_with_units(answers):
