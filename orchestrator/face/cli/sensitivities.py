@@ -18,6 +18,7 @@ from orchestrator.face.cli.arguments import (
     option,
 )
 from orchestrator.face.cli.case_arguments import add_case_arguments, chosen
+from orchestrator.face.cli.progress_lines import both, progress_lines
 from orchestrator.face.cli.terminal import make_console, print_json, print_warnings, warn
 from orchestrator.face.cli.verdict import add_verdict_argument, exit_code, print_verdicts
 from orchestrator.output.results.lock import hold_folder
@@ -48,8 +49,12 @@ def _compute(
 ) -> int:
     request, found = SensitivitiesRequest(**asked_by(options, SensitivitiesRequest)), []
     for scenario in scenarios:
-        with shown_progress("Parameters", shown=not options.json) as report:
-            found.append(sensitivities_of(scenario, replace(request, report=report)))
+        with (
+            progress_lines(make_console(), "sensitivities", "parameters") as lines,
+            shown_progress("Parameters", shown=not options.json) as report,
+        ):
+            told = replace(request, report=both(lines.report, report))
+            found.append(sensitivities_of(scenario, told))
     written = []
     if folder:
         for scenario, one in zip(scenarios, found, strict=True):

@@ -201,6 +201,7 @@ def find_sensitivities(
     about_mode: tuple[str, ...] = (
         (f"{unknown_name}; the mode here is the least damped one",) if unknown_name else ()
     )
+    about_mode += _not_least(found, chosen) if mode is None else ()
     if patterns:
         about_mode += _idle(prepared, rows)
     warnings = _neighbour(found.model, chosen)
@@ -228,6 +229,19 @@ def _place(row: Sensitivity) -> tuple[bool, bool, bool, float, float, str]:
         -abs(points or 0.0),
         -row.effect,
         row.parameter.name,
+    )
+
+
+def _not_least(found: ModesResult, chosen: Mode) -> tuple[str, ...]:
+    """Return that another mode is damped less than the one that was taken for its name, as the explorer takes it."""
+    least = _chosen(found, CRITICAL)
+    if least is chosen:
+        return ()
+    return (
+        f"the mode here is the first one that the case names; {least.frequency_hz:.3f} Hz is damped less, with "
+        f"{least.damping_percent:.2f} %: "
+        + Option.MODE
+        + f" {CRITICAL} takes that one, as `gfor explore` does",
     )
 
 

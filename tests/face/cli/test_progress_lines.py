@@ -7,7 +7,8 @@ import time
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.face.cli import explore, main, progress_lines
+from orchestrator.core.errors import InputError
+from orchestrator.face.cli import explore, main, progress_lines, sensitivities
 from orchestrator.face.cli.progress_lines import ProgressLines
 from orchestrator.studies.points.under_way import (
     counting,
@@ -49,6 +50,20 @@ def test_a_screening_tells_how_far_it_is_within_its_only_task(often, tmp_path, c
     assert {*range(1, 6)} & {*counts}
     assert any(re.search(r"about \d+ s left$", line) for line in said)
     assert "of 6 items" not in out
+
+
+def test_sensitivities_tell_how_many_parameters_are_done(often, capsys, monkeypatch):
+    """104 s of processor time had no line."""
+
+    def computed(scenario, request):
+        request.report(1, 4)
+        time.sleep(0.12)
+        raise InputError("enough")
+
+    monkeypatch.setattr(sensitivities, "sensitivities_of", computed)
+    assert main(["sensitivities", "two_area", "--scenario", "gfor"]) == 2
+    said = lines_of(capsys.readouterr().err, "sensitivities")
+    assert said[0].startswith("sensitivities: 1 of 4 parameters, ")
 
 
 def test_a_command_that_ends_before_the_first_line_says_nothing(tmp_path, capsys, monkeypatch):

@@ -1,6 +1,7 @@
 """Derivatives of modes by parameters: against formulas, against modes computed anew, and what makes them doubtful."""
 
 from contextlib import nullcontext
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from orchestrator.studies.modes.modes import running
 from orchestrator.studies.operating_points import bench
 from orchestrator.studies.sensitivities import sensitivities
 from orchestrator.studies.sensitivities.parameters import Parameter
+from orchestrator.studies.sensitivities.sensitivities import _not_least
 
 # Perturbed over a step of 1 ms, λ is right to about 1e-7 rad/s; over 2 % of 0.6 or of 0.1 that is what is allowed here.
 K, C = 25.0, 0.6
@@ -186,6 +188,19 @@ def test_fmus_are_opened_once_and_again_only_after_one_failed(
     assert says in rows[failed].reason
     others = whole.keys() - {failed}
     assert {n: rows[n].derivative for n in others} == {n: whole[n].derivative for n in others}
+
+
+def test_a_mode_that_was_taken_for_its_name_is_told_where_another_is_damped_less():
+    """The explorer takes the least damped mode, and orders other values first."""
+    least, named = (
+        SimpleNamespace(is_oscillation=True, frequency_hz=hertz, damping_percent=percent)
+        for hertz, percent in ((1.53, 20.95), (0.86, 28.7))
+    )
+    both = SimpleNamespace(modes=[least, named])
+    (told,) = _not_least(both, named)
+    assert "1.530 Hz is damped less, with 20.95 %" in told
+    assert "--mode critical" in told
+    assert _not_least(both, least) == ()
 
 
 def test_a_double_eigenvalue_is_doubted_in_every_row(tmp_path):
