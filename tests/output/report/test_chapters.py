@@ -895,6 +895,14 @@ def test_a_design_at_the_edge_says_that_there_is_no_margin(tmp_path):
     assert "20.00 % wanted; no margin: 9.57 % with 20 % more gain" in headline
 
 
+def test_a_design_says_that_less_gain_has_more_damping(tmp_path):
+    """The first sentence had 22.72 % with 200 pu, and a later one 36.17 % with 50 pu."""
+    less = SHEET | {"met": True, "less_gain": {"K": 50.0, "damping_ratio": 0.3617}}
+    text = written([made(tmp_path / "less", "design", less)], tmp_path)
+    headline = text[: text.index("<section")].replace("\N{NO-BREAK SPACE}", " ")
+    assert "20.00 % wanted; less gain has more: 36.17 % with K = 50 pu" in headline
+
+
 def test_a_prediction_says_its_gain_if_a_bound_changed_it(tmp_path):
     """With K 18.5 pu predicted and 200 pu set, the two modes are of different gains."""
     text = written([made(tmp_path / "bounded", "design", SHEET)], tmp_path)

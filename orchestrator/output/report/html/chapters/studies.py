@@ -118,6 +118,11 @@ def of_design(file: Path, c: Content) -> Chapter:
         f"{'yes' if c['met'] else 'not as required'}: with K = {c['K']:.4g} pu the mode has {after:.2f} % of damping, "
         f"{before:.2f} % before, {wanted:.2f} % wanted"
     )
+    less = c.get("less_gain")
+    if less:
+        answer += (
+            f"; less gain has more: {100 * less['damping_ratio']:.2f} % with K = {less['K']:.4g} pu"
+        )
     thin = c.get("thin_margin_damping_ratio")
     if thin:
         answer += f"; no margin: {100 * thin:.2f} % with 20 % more gain"
