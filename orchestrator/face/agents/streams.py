@@ -81,7 +81,7 @@ class _Wrapped:
 
 
 class Outgoing(_Wrapped):
-    """What the server says."""
+    """Messages of the server, on their way to the client."""
 
     def __init__(self, inner: Any, questions: Open) -> None:
         super().__init__(inner)
@@ -94,7 +94,7 @@ class Outgoing(_Wrapped):
 
 
 class Incoming(_Wrapped):
-    """What the client says; it ends when the client has ended and all its questions are answered."""
+    """Messages of the client; they end when the client has ended and all its questions are answered."""
 
     def __init__(self, inner: Any, outgoing: Any, questions: Open) -> None:
         super().__init__(inner)
