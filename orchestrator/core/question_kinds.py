@@ -1,6 +1,6 @@
 """Questions of one kind in one line: the first of them, how many more there are, and about what."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from orchestrator.core.errors import Problem, QuestionTopic, few
 
@@ -33,6 +33,21 @@ def by_kind(questions: Mapping[str, Problem], command: str = "") -> dict[str, st
         for first, line in _lines(of_kind, command):
             lines[first] = _with_short_place(line, questions[first], command)
     return lines
+
+
+def questions_below(questions: Iterable[Problem]) -> list[str]:
+    """Return a line that tells beside an answer how many questions stand below it, and about what; none without any.
+
+    A verdict rests on the values that are questioned, and a reader of its line may read no further."""
+    about = {
+        str(one): next(iter(one.topic.variables), one.place) if one.topic else one.place
+        for one in questions
+    }
+    if not about:
+        return []
+    number = f"{len(about)} question{'s' if len(about) > 1 else ''} below"
+    names = [name for name in dict.fromkeys(about.values()) if name]
+    return [f"{number}: {few(names, _SHOWN)}" if names else number]
 
 
 def besides(problems: Sequence[Problem], questions: Sequence[Problem]) -> list[Problem]:

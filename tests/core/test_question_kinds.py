@@ -6,7 +6,7 @@ import re
 import pytest
 
 from orchestrator.core.errors import Problem, QuestionTopic
-from orchestrator.core.question_kinds import by_kind
+from orchestrator.core.question_kinds import by_kind, questions_below
 from tests.cases.networks.psse.test_questions import CASE, DYR, RAW, changed
 
 
@@ -75,3 +75,14 @@ def test_a_command_shows_a_kind_once_and_its_remedy_answers_all(gfor, tmp_path):
     assert code == 0
     assert "T_d10" not in err
     assert found["scenarios"]
+
+
+def test_a_line_beside_the_answer_tells_of_questions_below():
+    """A green "stable" stood forty lines above the question whether an inertia of 6500 s is meant."""
+    one = Problem(
+        "--set sg1.machine.H", "too large", topic=QuestionTopic("H", "sg1", ("sg1.machine.H",))
+    )
+    other = Problem("loads.csv, line 3", "no load")
+    assert questions_below([]) == []
+    assert questions_below([one, one]) == ["1 question below: sg1.machine.H"]
+    assert questions_below([one, other]) == ["2 questions below: sg1.machine.H, loads.csv, line 3"]
