@@ -214,22 +214,7 @@ class Scenario(Unchanged):
         >>> gfor.load("two_area").scenario("pod_p").parameters().loc["gfor.pod_p.K", "value"]
         200.0
         """
-        rows = [
-            {
-                "parameter": f"{name}.{info.name}",
-                "value": plan.value(info.name),
-                "unit": info.unit or "1",
-                "type": info.type,
-                "variability": info.variability,
-                "minimum": info.minimum,
-                "maximum": info.maximum,
-                "description": info.description,
-            }
-            for name, plan in self.prepared.system.components.items()
-            for info in plan.description.variables.values()
-            if info.causality == "parameter"
-        ]
-        return pd.DataFrame(rows, dtype=object).set_index("parameter")
+        return pd.DataFrame(rows_of_parameters(self.prepared), dtype=object).set_index("parameter")
 
     @property
     def questions(self) -> list[str]:
@@ -552,6 +537,25 @@ def choose(
         names_given(names, "names"), asked.overrides, asked.step_size, stop, asked.files
     )
     return [Scenario(asked.scheduled(one), file, asked) for one in prepared]
+
+
+def rows_of_parameters(prepared: PreparedScenario) -> list[dict[str, Any]]:
+    """Return the rows of `Scenario.parameters`, for which nobody needs pandas."""
+    return [
+        {
+            "parameter": f"{name}.{info.name}",
+            "value": plan.value(info.name),
+            "unit": info.unit or "1",
+            "type": info.type,
+            "variability": info.variability,
+            "minimum": info.minimum,
+            "maximum": info.maximum,
+            "description": info.description,
+        }
+        for name, plan in prepared.system.components.items()
+        for info in plan.description.variables.values()
+        if info.causality == "parameter"
+    ]
 
 
 def question(scenarios: Iterable[PreparedScenario], above: int = 0) -> None:

@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.core.errors import CosimError
+from orchestrator.core.late import optimize
 
 _FAR = (
     0.3  # a mode that moves by more than this part of itself from corner to corner is not followed
@@ -109,7 +109,7 @@ def _partners(one: Complex, other: Complex) -> dict[int, int]:
     if not one.size or not other.size:
         return {}
     apart = np.abs(one[:, None] - other[None]) / np.maximum(np.abs(one[:, None]), 1e-9)
-    rows, columns = linear_sum_assignment(apart)
+    rows, columns = optimize.linear_sum_assignment(apart)
     pairs = zip(rows.tolist(), columns.tolist(), strict=True)
     return {k: j for k, j in pairs if apart[k, j] < _FAR}
 

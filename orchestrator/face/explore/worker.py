@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from orchestrator.cases.flow.sharing import SharingRule
 from orchestrator.cases.form.schema import Value
@@ -23,11 +22,12 @@ from orchestrator.cases.settings.layers import OptionValues
 from orchestrator.core.arrays import Complex
 from orchestrator.core.errors import CosimError, InputError, StartError, few
 from orchestrator.core.interrupts import calls
+from orchestrator.core.late import optimize
 from orchestrator.core.question_kinds import by_kind
 from orchestrator.core.spelling import as_options
 from orchestrator.face.api.case import Case, load
 from orchestrator.face.api.results import Modes
-from orchestrator.face.api.scenario import Scenario
+from orchestrator.face.api.scenario import Scenario, rows_of_parameters
 from orchestrator.face.explore.copied import copied, events_of, explored, saved
 from orchestrator.face.explore.diagram import diagram
 from orchestrator.face.explore.movers import movers
@@ -99,7 +99,7 @@ def matched(base: Complex, other: Complex) -> Complex:
     found = np.full(base.shape, np.nan + 0j)
     if base.size and other.size:
         apart = np.abs(base[:, None] - other[None]) / np.maximum(np.abs(base[:, None]), 1e-9)
-        rows, columns = linear_sum_assignment(apart)
+        rows, columns = optimize.linear_sum_assignment(apart)
         near = apart[rows, columns] < _FAR
         found[rows[near]] = other[columns[near]]
     return found
@@ -316,7 +316,7 @@ def _titles(case: Case) -> dict[str, Any]:
 
 def _parameters(case: Case, scenario: Scenario) -> dict[str, Any]:
     """The parameters that a slider or a switch can set, the signals that can be drawn, and the diagram."""
-    listed = scenario.parameters().reset_index().to_dict("records")
+    listed = rows_of_parameters(scenario.prepared)
     shown = [row for row in listed if row["type"] in ("Real", "Integer", "Boolean")]
     return {
         "parameters": [row | {"switches": _switches(scenario, row["parameter"])} for row in shown],

@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from orchestrator.core.arrays import Complex, Numbers
+from orchestrator.core.late import optimize
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.continuation import pair_of
 from orchestrator.linear.spectra.mode_tracking import similarity
@@ -110,7 +110,7 @@ def _as_before(before: Sequence[Mode], after: Sequence[Mode]) -> Iterator[tuple[
     """Each mode, least damped first, with the one that it was before; None for one that was not there.
 
     Those belong together whose shapes are alike, and whose eigenvalues are near; each belongs to one at most."""
-    rows, columns = linear_sum_assignment(_unlikeness(after, before))
+    rows, columns = optimize.linear_sum_assignment(_unlikeness(after, before))
     was = dict(zip(rows.tolist(), columns.tolist(), strict=True))
     for row in sorted(range(len(after)), key=lambda k: after[k].damping_ratio):
         yield after[row], before[was[row]] if row in was else None

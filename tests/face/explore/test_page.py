@@ -13,6 +13,7 @@ import pytest
 import orchestrator as gfor
 from orchestrator.cases.case import load_case
 from orchestrator.face.cli import main
+from orchestrator.face.explore import saved
 from orchestrator.face.explore.opened import opened as opened_folder
 from orchestrator.face.explore.server import Explorer
 from orchestrator.face.explore.worker import Desk
@@ -51,6 +52,22 @@ def two_area():
         yield explorer
 
 
+HOSTILE = '"><img src=x onerror=document.title=1><script>document.title=2</script>'
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    """An explorer of a small case of short runs with a hostile title, and the case's folder."""
+    folder = tmp_path_factory.mktemp("small")
+    text, quoted = gfor.load("infinite_bus").file.text, json.dumps(HOSTILE)
+    text = re.sub(r"^title = .*$", lambda _: f"title = {quoted}", text, flags=re.MULTILINE)
+    assert text.count(quoted) >= 2
+    text = re.sub(r'stop_time = "[^"]*"', 'stop_time = "1.5 s"', text)
+    (folder / "case.toml").write_text(text, encoding="utf-8")
+    with served(str(folder / "case.toml"), "load_step") as explorer:
+        yield explorer, folder
+
+
 @contextmanager
 def opened(browser, address):
     """The page, once it has painted exact modes and knows the parameters; no error may be said on the console."""
@@ -76,6 +93,21 @@ def opened(browser, address):
 def view(browser, two_area):
     with opened(browser, two_area.address) as found:
         yield found
+
+
+@pytest.fixture(scope="module")
+def still_page(browser, two_area):
+    with opened(browser, two_area.address) as found:
+        add(found, "gfor.pod_p.K")
+        found.evaluate("window.asking = ask")
+        yield found
+
+
+@pytest.fixture
+def still(still_page):
+    """The page with a control of the gain, for tests that call its functions; afterwards it asks the server as ever."""
+    yield still_page
+    still_page.evaluate("ask = asking")
 
 
 def computed(view, count):
@@ -285,23 +317,17 @@ def test_a_click_on_the_diagram_takes_a_unit_out_and_makes_a_line_longer(view, c
 
 
 @needs_chromium
-def test_responses_are_drawn_and_a_run_is_streamed(browser, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    text = gfor.load("infinite_bus").file.text
-    (tmp_path / "case.toml").write_text(
-        re.sub(r'stop_time = "[^"]*"', 'stop_time = "1.5 s"', text), encoding="utf-8"
-    )
-    with (
-        served(str(tmp_path / "case.toml"), "load_step") as explorer,
-        opened(browser, explorer.address) as view,
-    ):
+def test_responses_are_drawn_and_a_run_is_streamed(browser, small, monkeypatch):
+    explorer, folder = small
+    monkeypatch.chdir(folder)  # where the process for runs begins
+    with opened(browser, explorer.address) as view:
         view.locator("#tab-response").click()
         view.locator("#linear").click()
         view.locator("#plots .curve.linear").first.wait_for(state="attached")
         view.locator("#run").click()
         view.locator("#run-said", has_text="kept in").wait_for()
         assert view.locator("#plots .curve:not(.linear)").count() >= 1
-        assert list((tmp_path / "results").rglob("trajectory.nc"))
+        assert list((folder / "results").rglob("trajectory.nc"))
 
 
 @needs_chromium
@@ -321,20 +347,9 @@ def test_a_worker_that_dies_ends_its_computation_and_not_the_page(view, two_area
     computed(view, 3)
 
 
-HOSTILE = '"><img src=x onerror=document.title=1><script>document.title=2</script>'
-
-
 @needs_chromium
-def test_names_are_never_markup(browser, tmp_path):
-    text = gfor.load("infinite_bus").file.text
-    quoted = json.dumps(HOSTILE)
-    text = re.sub(r"^title = .*$", lambda _: f"title = {quoted}", text, flags=re.MULTILINE)
-    assert text.count(quoted) >= 2
-    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
-    with (
-        served(str(tmp_path / "case.toml"), "dip") as explorer,
-        opened(browser, explorer.address) as view,
-    ):
+def test_names_are_never_markup(browser, small):
+    with opened(browser, small[0].address) as view:
         assert HOSTILE in view.locator("#verdict").inner_text()
         assert HOSTILE in view.locator("#title").inner_text()
         assert view.locator("img, section script, header script").count() == 0
@@ -436,7 +451,10 @@ def halfway_between_two(view, slider):
 
 
 @needs_chromium
-def test_a_saved_page_has_the_five_sliders_each_of_which_moves_alone(browser, tmp_path, capsys):
+def test_a_saved_page_has_the_five_sliders_each_of_which_moves_alone(
+    browser, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setattr(saved, "_STEPS", 4)  # a slider's ends are the same with any number between
     page = tmp_path / "page.html"
     assert main(["explore", "two_area", "--scenario", "pod_p", "--save", str(page)]) == 0
     with opened(browser, page.as_uri()) as view:
@@ -488,10 +506,9 @@ def test_a_value_with_a_wanted_damping_is_found(view, capsys):
         (1.17e-3, 2e-6, 2123, "not tried below"),  # the slope at its own value leads far out
     ],
 )
-def test_a_search_ends_where_the_slope_leads_far_out(view, slope, bend, found, told):
+def test_a_search_ends_where_the_slope_leads_far_out(still, slope, bend, found, told):
     """Of a damping of −1.5 % + slope·K + bend·K², at K = 200: to the sliders' ends, and on while it leads to 10 %."""
-    control = add(view, "gfor.pod_p.K")
-    view.evaluate(
+    still.evaluate(
         """([slope, bend]) => {
             window.tried = [];
             ask = async (what, question) => {
@@ -505,12 +522,13 @@ def test_a_search_ends_where_the_slope_leads_far_out(view, slope, bend, found, t
         }""",
         [slope, bend],
     )
-    view.evaluate("seen.finders['pod_p gfor.pod_p.K'].search(10, false)")
+    still.evaluate("seen.finders['pod_p gfor.pod_p.K'].search(10, false)")
+    control = still.locator('.control[data-name="gfor.pod_p.K"]')
     said = control.locator(".finder [role=status]").inner_text()
     assert told in said
     if found is None:
         assert said.startswith("not reached; nearest: ")
-        assert max(view.evaluate("tried")) == 1100
+        assert max(still.evaluate("tried")) == 1100
     else:
         assert float(re.match(r"10\.00 % at K (\S+);", said)[1]) == pytest.approx(found, abs=2)
 
@@ -539,29 +557,31 @@ def test_stability_is_lost_beyond_the_sliders_range_and_said_in_the_sweeps_words
 
 
 @needs_chromium
-def test_a_question_that_another_one_overtook_is_no_longer_counted(view):
+def test_a_question_that_another_one_overtook_is_no_longer_counted(still):
     """A newer one of the same name is; the header counted a search of 2 s up to 103 s."""
-    at_work = view.locator("#work")
-    view.evaluate(
+    at_work = still.locator("#work")
+    still.evaluate(
         """() => {
             const asked = window.fetch, held = [];
             window.fetch = (place, given) => JSON.parse(given.body).ask === "held"
                 ? new Promise(answer => held.push(answer)) : asked(place, given);
+            window.afterwards = () => { window.fetch = asked; };
             window.begin = () => ask("search", { ask: "held" });
             window.overtake = () => held.shift()({ ok: true, json: async () => ({ superseded: true }) });
         }"""
     )
-    view.evaluate("() => { window.first = begin(); }")
+    still.evaluate("() => { window.first = begin(); }")
     assert "search … " in at_work.inner_text()
-    view.evaluate("async () => { overtake(); await first; }")
+    still.evaluate("async () => { overtake(); await first; }")
     assert "search" not in at_work.inner_text()
-    view.evaluate("() => { window.older = begin(); }")
-    view.evaluate("async () => { begin(); overtake(); await older; }")
+    still.evaluate("() => { window.older = begin(); }")
+    still.evaluate("async () => { begin(); overtake(); await older; }")
     assert "search … " in at_work.inner_text()
+    still.evaluate("afterwards()")
 
 
 @needs_chromium
-def test_a_drift_of_the_common_speed_is_told_as_one(view):
+def test_a_drift_of_the_common_speed_is_told_as_one(still):
     """And growth of another kind by the components of the states that take part most."""
     verdict = {
         "largest_growth_rate": 0.0213,
@@ -570,9 +590,9 @@ def test_a_drift_of_the_common_speed_is_told_as_one(view):
         "common_speed": ["sg1.omega", "sg2.omega"],
         "sentence": "",
     }
-    told = view.evaluate("verdict => growthOf(verdict)", verdict)
+    told = still.evaluate("verdict => growthOf(verdict)", verdict)
     assert told == "the common speed drifts at +0.021 1/s without a governor, all machines alike"
-    other = view.evaluate("verdict => growthOf(verdict)", verdict | {"common_speed": []})
+    other = still.evaluate("verdict => growthOf(verdict)", verdict | {"common_speed": []})
     assert other == "a mode grows at +0.021 1/s (no oscillation, in sg1)"
 
 
@@ -599,28 +619,27 @@ def test_questions_are_about_the_gain_that_moves_the_mode_most(view):
 
 
 @needs_chromium
-def test_a_refused_outage_and_a_search_that_cannot_act_say_so(browser):
-    with served("two_area", "gfor") as explorer, opened(browser, explorer.address) as view:
-        before = view.locator("#verdict").inner_text()
-        view.locator("#tab-network").click()
-        view.locator('.thing[data-thing="unit sg2"]').click(force=True)
-        view.locator("#element input[type=checkbox]").click()
-        view.locator(
-            "#failure", has_text="not computed; what is shown is the state before"
-        ).wait_for()
-        assert view.locator("#element input[type=checkbox]").is_checked()
-        refused = view.locator("#element [role=alert]").inner_text()
-        assert refused  # in whole, and once: the line on top only says what is shown
-        assert view.locator("#failure").inner_text().endswith("what is shown is the state before")
-        assert view.evaluate("$('element').scrollWidth <= $('element').clientWidth")  # a long path
-        assert view.locator("#controls .control").count() == 0
-        assert view.evaluate("state.values") == {}
-        assert view.locator("#verdict").inner_text() == before
-        idle = add(view, "gfor.pod_p.K")  # its controller is off
-        idle.locator("button", has_text="find").click()
-        idle.locator(
-            ".finder", has_text="gfor.pod_p.K cannot act: gfor.pod_p.enabled is false"
-        ).wait_for()
+def test_a_refused_outage_and_a_search_that_cannot_act_say_so(view):
+    view.locator("#scenario").select_option("gfor")
+    computed(view, 2)
+    before = view.locator("#verdict").inner_text()
+    view.locator("#tab-network").click()
+    view.locator('.thing[data-thing="unit sg2"]').click(force=True)
+    view.locator("#element input[type=checkbox]").click()
+    view.locator("#failure", has_text="not computed; what is shown is the state before").wait_for()
+    assert view.locator("#element input[type=checkbox]").is_checked()
+    refused = view.locator("#element [role=alert]").inner_text()
+    assert refused  # in whole, and once: the line on top only says what is shown
+    assert view.locator("#failure").inner_text().endswith("what is shown is the state before")
+    assert view.evaluate("$('element').scrollWidth <= $('element').clientWidth")  # a long path
+    assert view.locator("#controls .control").count() == 0
+    assert view.evaluate("state.values") == {}
+    assert view.locator("#verdict").inner_text() == before
+    idle = add(view, "gfor.pod_p.K")  # its controller is off
+    idle.locator("button", has_text="find").click()
+    idle.locator(
+        ".finder", has_text="gfor.pod_p.K cannot act: gfor.pod_p.enabled is false"
+    ).wait_for()
 
 
 @needs_chromium
