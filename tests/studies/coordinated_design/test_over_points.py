@@ -201,8 +201,9 @@ def test_a_point_that_a_nominal_design_destabilises_is_seen(case, tmp_path, stor
     assert "UNSTABLE at 1 of 2, the first: long, intact" in verdict_sentence(verdicts["all"])
 
 
-def test_a_wrong_sign_of_a_loop_is_seen(planned, store, monkeypatch):
-    """The search believes its models; the verdict does not."""
+def test_a_wrong_sign_of_a_loop_is_seen(planned, points, store, monkeypatch):
+    """The search believes its models; the verdict does not, at two points."""
+    points.write_text("name,grid.X_L\nshort,0.05\nusual,0.1\n")
     measured = point.measure
 
     def wrong(*arguments):
@@ -627,8 +628,11 @@ def test_settings_named_of_a_network_file_give_their_figures_when_they_are_typed
     assert told > least() + 0.05, "the setting is worth something"
 
 
-def test_that_a_damping_cannot_be_had_needs_a_grid(planned, store, monkeypatch):
-    """Without one only the best that was found is said; and a search that was cut short is helped by the grid."""
+def test_that_a_damping_cannot_be_had_needs_a_grid(planned, points, store, monkeypatch):
+    """Without one only the best that was found is said; and a search that was cut short is helped by the grid.
+
+    At one point: a grid's settings are the same for any number of them."""
+    points.write_text("name,grid.X_L\nusual,0.1\n")
     monkeypatch.setattr(
         SettingSearch,
         "best",
