@@ -87,7 +87,7 @@ def spelt(request):
 
 
 @pytest.fixture(scope="session", autouse=True)
-def shared(tmp_path_factory):
+def shared_by_workers(tmp_path_factory):
     once.share_in(tmp_path_factory)
 
 

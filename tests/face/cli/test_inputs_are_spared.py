@@ -61,9 +61,9 @@ def test_what_lies_beside_may_be_written(gfor, files, tmp_path):
 
 
 def test_a_design_replaces_a_parameter_file_and_no_other(files):
-    assert _writable(Path("own.toml")) == Path("own.toml")
+    assert _writable(Path("own.toml"), "usual.toml") == Path("own.toml")
     with pytest.raises(InputError, match="another file is there, not a parameter file"):
-        _writable(Path("net.raw"))
+        _writable(Path("net.raw"), "usual.toml")
 
 
 @pytest.fixture
