@@ -278,8 +278,8 @@ def _reached_values(
             computed({key: x})
         except CosimError as error:
             failure = Failure.of(error)
-            said = first_sentence(str(failure.cause or failure.text)).removesuffix(".")
-            why["below" if x < value else "above"] = short(said, _LONGEST_REASON)
+            said = first_sentence(str(failure.cause or failure.text))
+            why["below" if x < value else "above"] = short(said.rstrip("."), _LONGEST_REASON)
             return False
         return True
 
