@@ -1,5 +1,6 @@
 """One thread for linear algebra on small or sparse matrices: several threads would only wait for each other."""
 
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
@@ -12,7 +13,9 @@ from threadpoolctl import ThreadpoolController
 
 def one_thread() -> AbstractContextManager[Any]:
     """Inside ``with``, BLAS and similar libraries use one thread."""
-    limited: AbstractContextManager[Any] = _controller().limit(limits=1)
+    limited: AbstractContextManager[Any] = _controller("scipy.linalg" in sys.modules).limit(
+        limits=1
+    )
     return limited
 
 
@@ -63,6 +66,6 @@ def alone() -> Iterator[None]:
 
 
 @cache
-def _controller() -> ThreadpoolController:
-    """Looking for the libraries that are loaded takes milliseconds; they are there once SciPy is."""
+def _controller(with_scipy: bool) -> ThreadpoolController:
+    """Looking for loaded libraries takes milliseconds: it is done for NumPy's, and once more when SciPy's are there."""
     return ThreadpoolController()

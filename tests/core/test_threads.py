@@ -1,5 +1,8 @@
 """What is computed side by side: at the same time, with its error, and with one thread of BLAS."""
 
+import os
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -94,3 +97,22 @@ def test_who_is_alone_may_ask_for_it_again_and_others_wait():
     assert not entered.wait(0.1)
     go_on.set()
     assert entered.wait(10)
+
+
+def test_libraries_that_come_with_scipy_later_are_limited_as_well():
+    """A device is checked by NumPy alone; what the same process computes afterwards has SciPy's BLAS beside it."""
+    code = """
+from orchestrator.core.threads import one_thread
+from threadpoolctl import threadpool_info
+with one_thread():
+    early = len(threadpool_info())
+import scipy.linalg
+with one_thread():
+    assert len(threadpool_info()) > early, "nothing new to limit"
+    print({library["num_threads"] for library in threadpool_info()})
+"""
+    free = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    found = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=free, check=True
+    )
+    assert found.stdout == "{1}\n"
