@@ -13,9 +13,8 @@ from threadpoolctl import ThreadpoolController
 
 def one_thread() -> AbstractContextManager[Any]:
     """Inside ``with``, BLAS and similar libraries use one thread."""
-    limited: AbstractContextManager[Any] = _controller("scipy.linalg" in sys.modules).limit(
-        limits=1
-    )
+    controller = _controller("scipy.linalg" in sys.modules)
+    limited: AbstractContextManager[Any] = controller.limit(limits=1)
     return limited
 
 

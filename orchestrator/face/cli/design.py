@@ -241,9 +241,9 @@ def _request(options: argparse.Namespace) -> DesignRequest:
 
 def _writable(out: Path | None, usual: str) -> Path:
     """The parameter file's path, tried before anything is computed; of its ``usual`` name in a folder."""
-    folder = Path() if out is None else out
-    in_folder = folder.is_dir() or not folder.suffix
-    path = folder / usual if in_folder else parameter_file_path(folder, "--out")
+    place = Path() if out is None else out
+    is_folder = place.is_dir() or not place.suffix
+    path = place / usual if is_folder else parameter_file_path(place, "--out")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         existed = path.exists()

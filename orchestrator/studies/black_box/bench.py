@@ -25,8 +25,9 @@ from orchestrator.linear.models.sampled import steps_of_times, times_of
 
 _SOURCE = Path(__file__).with_name("drive.c")
 _CALLS = {1: "fmi2SetReal", 2: "fmi2DoStep", 3: "fmi2GetReal"}
-# steps in one call of the C library; an interrupt from the keyboard takes effect between two
-_STRETCH = 20000
+STEPS_AT_ONCE = 20000
+"""Steps in one call of the C library; an interrupt from the keyboard takes effect between two."""
+
 _NOT_FINITE = -1  # status of drive.c where an output is no finite number
 
 STILL = 1e-9
@@ -249,8 +250,8 @@ def drive(
 
     Raises an `AnalysisError` if an output is no finite number, and a `ComponentError` if the FMU refuses a call."""
     outputs = np.empty((len(inputs), len(names[1])))
-    for first in range(0, len(inputs), _STRETCH):
-        part = slice(first, min(first + _STRETCH, len(inputs)))
+    for first in range(0, len(inputs), STEPS_AT_ONCE):
+        part = slice(first, min(first + STEPS_AT_ONCE, len(inputs)))
         rows = np.ascontiguousarray(inputs[part])
         read = None if late is None else np.ascontiguousarray(late[part])
         _drive_stretch(component, names, (rows, read, outputs[part]), step_size, index + first)

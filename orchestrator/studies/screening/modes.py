@@ -230,9 +230,8 @@ def _with_drift(model: LinearModel, found: FoundModes, speeds: Sequence[str]) ->
     """The same, told whether what grows fastest beside the modes is the drift of the common speed."""
     if found.fastest is None or found.fastest.imag or not speeds:
         return found
-    beside = complex(
-        found.fastest.real + _BESIDE_ZERO
-    )  # at an eigenvalue itself nothing can be solved
+    # at an eigenvalue itself nothing can be solved
+    beside = complex(found.fastest.real + _BESIDE_ZERO)
     ((value, left, right),) = nearest_pairs(model.coupled, beside, 1)
     mode = make_mode(complex(value.real), left, right, model.names)
     return replace(found, drifts=is_common_speed(mode, matching(model.names, speeds)))

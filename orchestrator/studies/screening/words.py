@@ -192,11 +192,9 @@ def verdict_of(summary: Summary) -> VerdictSentence:
         if len(drifting) == len(summary.unstable):
             return _drift_alone(summary)
         worst = min(summary.unstable, key=_rank)
-        told = (not_judged(summary), runs_sentence(summary), summary.beyond, _widened(summary))
-        lost = "".join(f"; {text}" for text in told if text)
         at = f"at {counted_items(len(summary.unstable), total, planned)}; worst: {where(summary, worst)}"
         rest = f"; at {len(drifting)} of them only the common speed drifts" if drifting else ""
-        text = f"{at}{_least(worst)}{rest}{lost}"
+        text = f"{at}{_least(worst)}{rest}{_told_beside(summary)}"
         return VerdictSentence(False, "UNSTABLE", text)
     if summary.gone_wrong:
         text = f"in {len(summary.gone_wrong)} of {len(summary.runs)} runs of outages, though no mode grows"
@@ -242,10 +240,14 @@ def _drift_alone(summary: Summary) -> VerdictSentence:
     fastest = max(summary.unstable, key=lambda item: _fastest_growth(item.record))
     rate, at = _fastest_growth(fastest.record), counted_items(len(summary.unstable), total, planned)
     most = f", the fastest {where(summary, fastest)}" if len(summary.unstable) > 1 else ""
-    told = (not_judged(summary), runs_sentence(summary), summary.beyond, _widened(summary))
-    rest = "".join(f"; {text}" for text in told if text)
-    text = f"at {at}: {drift_in_words(rate)}{most}{_least_of_all(summary)}{rest}"
+    text = f"at {at}: {drift_in_words(rate)}{most}{_least_of_all(summary)}{_told_beside(summary)}"
     return VerdictSentence(False, "UNSTABLE", text)
+
+
+def _told_beside(summary: Summary) -> str:
+    """Tell behind growth of items that were not judged, of runs, of swings above the range and of widened limits."""
+    told = (not_judged(summary), runs_sentence(summary), summary.beyond, _widened(summary))
+    return "".join(f"; {text}" for text in told if text)
 
 
 def _widened(summary: Summary) -> str:

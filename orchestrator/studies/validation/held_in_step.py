@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers
-from orchestrator.studies.black_box.bench import Stretches, Turning
+from orchestrator.studies.black_box.bench import STEPS_AT_ONCE, Stretches, Turning
 
 _GAIN = 2.0
 """Speed of the turn for a whole current that is a radian off [1/s]; from 1 to 4 the right model leaves the least."""
@@ -28,9 +28,6 @@ _INTERVAL = 1e-3
 
 _LASTS = 1.0
 """Time for which a turn counts [s]: an angle that stays is another zero, and moves nothing."""
-
-_AT_ONCE = 20000
-"""Steps in one call of the C library; an interrupt from the keyboard takes effect between two."""
 
 _REACTANCE = 1.0
 """Between the turned voltage and the recorded one, through which a turn counts as power [pu of the rating]."""
@@ -77,7 +74,7 @@ def hold_at_once(
         lasts=_LASTS,
         scale=scale,
     )
-    at_once = max(1, _AT_ONCE // each)  # stretches
+    at_once = max(1, STEPS_AT_ONCE // each)  # stretches
     for first in range(0, count, at_once * each):
         asked.count = min(at_once * each, count - first)
         asked.voltage, asked.late = held[first:].ctypes.data, late[first:].ctypes.data
