@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.all_code import asked_of_all_code
 from tests.support.source_files import product_files, read_source
 
 ROOT = Path(__file__).parents[1]
@@ -124,13 +125,19 @@ def inside():
             yield source
 
 
-def test_inside_a_docstring_says_what_the_name_does_not():
-    empty = [
+@asked_of_all_code
+def empty_docstrings():
+    """Where a docstring says nothing, and its text."""
+    return [
         f"{source.place}:{node.lineno} {node.name}: {text!r}"
         for source in inside()
         for node, text in documented(source.of(*DEFINITIONS))
         if says_nothing(node, cleandoc(text))
     ]
+
+
+def test_inside_a_docstring_says_what_the_name_does_not():
+    empty = empty_docstrings()
     assert not empty, "say what the name does not, or nothing:\n" + "\n".join(empty)
 
 

@@ -26,6 +26,7 @@ from orchestrator.output.results.csv_recording import read_table
 from orchestrator.simulation.interop.probe_result import read_probe_result
 from orchestrator.studies.immittance.scan_files import read_scan
 from orchestrator.systems.ssp.archive import SspArchive
+from tests.support.all_code import asked_of_all_code
 from tests.support.source_files import product_files
 
 ROOT = Path(__file__).parents[1]
@@ -188,12 +189,16 @@ def reads_by_itself(source):
                 yield node.lineno
 
 
+@asked_of_all_code
+def reads_by_module():
+    """Module → lines in which it reads by itself."""
+    found = {source.module: [*reads_by_itself(source)] for source in product_files("orchestrator")}
+    return {name.removeprefix("orchestrator."): lines for name, lines in found.items() if lines}
+
+
 def test_whoever_reads_a_named_file_asks_here():
     """A reader that opens what a user names by itself hangs at a pipe."""
-    found = {}
-    for source in product_files("orchestrator"):
-        if lines := list(reads_by_itself(source)):
-            found[source.module.removeprefix("orchestrator.")] = lines
+    found = reads_by_module()
     new = {name: lines for name, lines in found.items() if name not in OWN}
     assert not new, "use orchestrator.core.foreign_files, or say in OWN why it need not"
     assert not set(OWN) - set(found), "these read nothing any more"
@@ -332,7 +337,9 @@ def _called(source):
         yield owner, name, {word.arg: word.value for word in node.keywords}
 
 
-def test_no_reader_is_called_that_runs_code_out_of_a_file():
+@asked_of_all_code
+def calls_that_run_code():
+    """File and function of each call that builds any object out of a file."""
     found = []
     for source in product_files():
         for owner, name, words in _called(source):
@@ -345,5 +352,10 @@ def test_no_reader_is_called_that_runs_code_out_of_a_file():
             }
             if (name in RUNS_CODE and owner in {"pd", "pickle"}) or pickles or unpickles:
                 found.append((source.place, f"{owner}.{name}".lstrip(".")))
+    return found
+
+
+def test_no_reader_is_called_that_runs_code_out_of_a_file():
+    found = calls_that_run_code()
     assert [one for one in found if one[0] not in FROM_OUR_OWN_PROCESS] == []
     assert {place for place, _ in found} == FROM_OUR_OWN_PROCESS

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.all_code import asked_of_all_code
 from tests.support.form import RULES
-from tests.support.once import computed_once
 from tests.support.source_files import ROOT, SourceFile, product_files
 
 LIMITS = tomllib.loads((Path(__file__).parent / "form.toml").read_text(encoding="utf-8"))
@@ -35,7 +35,7 @@ def count(values):
 '''
 
 
-@computed_once
+@asked_of_all_code
 def places_by_rule():
     """Where each rule is broken, as ``path:line``."""
     return {

@@ -111,3 +111,9 @@ def product_files(*folders: str) -> list[SourceFile]:
             for folder in folders or PRODUCT
             for path in sorted((ROOT / folder).rglob("*.py"))
         ]
+
+
+def forget_sources() -> None:
+    """Let go of the syntax trees."""
+    product_files.cache_clear()
+    read_source.cache_clear()

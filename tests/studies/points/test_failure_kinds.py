@@ -27,6 +27,7 @@ from orchestrator.studies.points.points import Work
 from orchestrator.studies.points.store import PointStore
 from orchestrator.studies.screening.request import ScreeningRequest
 from orchestrator.studies.screening.study import plan_screening, run_screening
+from tests.support.all_code import asked_of_all_code
 from tests.support.source_files import product_files
 
 ROOT = Path(__file__).parents[3]
@@ -231,9 +232,13 @@ def test_other_texts_may_be_cut(line):
     assert not searches(ast.walk(ast.parse(line)))
 
 
+@asked_of_all_code
+def searches_by_file():
+    """File → lines in which it looks into a message."""
+    found = {source.place: searches(source.of(ast.AST)) for source in product_files("orchestrator")}
+    return {place: lines for place, lines in found.items() if lines}
+
+
 def test_no_code_decides_by_the_text_of_a_message():
-    found = {}
-    for source in product_files("orchestrator"):
-        if lines := searches(source.of(ast.AST)):
-            found[source.place] = lines
+    found = searches_by_file()
     assert {name: len(lines) for name, lines in found.items()} == ALLOWED, found
