@@ -124,13 +124,13 @@ def find_modes_here(
     Raises an `AnalysisError` if neither the search nor the growth that is counted comes to an end, and the system is
     too large for all of its eigenvalues."""
     if len(model.names) <= DENSE:
-        return _whole(model, wanted, speeds)
+        return _whole(model, wanted, speeds, looks_above=True)
     equations = ShiftedEquations(model)
     found = None if neighbour is None else _from_neighbour(model, equations, wanted, neighbour)
     searched = found is None
     if found is None:
         if len(model.names) <= MOST_COUNTED:
-            return replace(_whole(model, wanted, speeds), looked_above=False, above=None)
+            return _whole(model, wanted, speeds)
         found = _from_search(model, equations, wanted)
     if not count:
         return FoundModes(found, searched, None)
@@ -205,25 +205,45 @@ def _modes_within(modes: ModeSet, wanted: CriticalRegion) -> ModeSet:
     )
 
 
-def _whole(model: LinearModel, wanted: CriticalRegion, speeds: Sequence[str] = ()) -> FoundModes:
-    highest = max(wanted.wider.highest_hz, LOCAL_HZ)
-    spectrum = find_spectrum(model, wanted.wider.lowest_hz, highest)
+def _whole(
+    model: LinearModel,
+    wanted: CriticalRegion,
+    speeds: Sequence[str] = (),
+    *,
+    looks_above: bool = False,
+) -> FoundModes:
+    """The modes among all eigenvalues.
+
+    ``looks_above``: whether swings of machines are looked for above the range as well."""
+    highest = wanted.wider.highest_hz
+    spectrum = find_spectrum(
+        model, wanted.wider.lowest_hz, max(highest, LOCAL_HZ) if looks_above else highest
+    )
     swinging = [mode for mode in spectrum.modes if mode.is_oscillation]
     modes = _modes_within(ModeSet.of(swinging, model.names), wanted)
     found = _among(spectrum.eigenvalues, model, modes, searched=True)
-    higher = [
-        mode
-        for mode in swinging
-        if wanted.highest_hz < mode.frequency_hz <= LOCAL_HZ and is_swing(mode, speeds)
-    ]
-    above = min(higher, key=lambda mode: mode.damping_percent, default=None)
     rightmost = spectrum.rightmost
     drifts = (
         rightmost is not None
         and rightmost.eigenvalue == found.fastest
         and is_common_speed(rightmost, matching(model.names, speeds))
     )
-    return replace(found, looked_above=True, above=above, drifts=drifts)
+    found = replace(found, drifts=drifts)
+    if not looks_above:
+        return found
+    return replace(found, looked_above=True, above=_swing_above(swinging, wanted, speeds))
+
+
+def _swing_above(
+    swinging: Sequence[Mode], wanted: CriticalRegion, speeds: Sequence[str]
+) -> Mode | None:
+    """The least damped swing of machines above the range, up to `LOCAL_HZ`."""
+    higher = [
+        mode
+        for mode in swinging
+        if wanted.highest_hz < mode.frequency_hz <= LOCAL_HZ and is_swing(mode, speeds)
+    ]
+    return min(higher, key=lambda mode: mode.damping_percent, default=None)
 
 
 def _with_drift(model: LinearModel, found: FoundModes, speeds: Sequence[str]) -> FoundModes:

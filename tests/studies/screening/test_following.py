@@ -16,7 +16,7 @@ from orchestrator.linear.spectra.mode_tracking import ModeSet
 from orchestrator.linear.spectra.modes import find_spectrum
 from orchestrator.linear.spectra.shifted_equations import ShiftedEquations, count_growing
 from orchestrator.studies.modes.modes import running
-from orchestrator.studies.screening.modes import CriticalRegion, find_modes_here
+from orchestrator.studies.screening.modes import LOCAL_HZ, CriticalRegion, find_modes_here
 from tests.support.scenarios import prepare_one
 
 REGION = CriticalRegion(0.1, 2.0, 0.2)
@@ -167,6 +167,29 @@ def test_what_is_found_anew_is_the_same_by_a_search_and_among_all_eigenvalues(
     # some have the same damping, and no order of their own
     assert sorted(critical, key=np.imag) == pytest.approx(sorted(held, key=np.imag))
     assert found.growing_elsewhere == 0
+
+
+@pytest.mark.parametrize(("n", "looked"), [(40, True), (220, False)])
+def test_swings_above_the_range_are_looked_for_where_they_are_told_alone(n, looked, monkeypatch):
+    """Planted above the range: a small system tells it, a larger one does not look for it."""
+    module = "orchestrator.studies.screening.modes"
+    highest = []
+
+    def spied(model, lowest_hz, highest_hz):
+        highest.append(highest_hz)
+        return find_spectrum(model, lowest_hz, highest_hz)
+
+    monkeypatch.setattr(f"{module}.find_spectrum", spied)
+    if not looked:
+        monkeypatch.setattr(f"{module}.is_swing", None)
+    model = system((*KNOWN, -0.1 + 18j), n=n)
+    found = find_modes_here(model, np.zeros(0), REGION, None, count=False, speeds=["c.x*"])
+    assert found.looked_above == looked
+    assert highest == [LOCAL_HZ if looked else REGION.wider.highest_hz]
+    assert (found.above is not None) == looked
+    assert not looked or found.above.eigenvalue == pytest.approx(-0.1 + 18j)
+    # all others within the region that is wider than what is asked for
+    assert len(found.modes.eigenvalues) == len(KNOWN)
 
 
 @pytest.fixture
