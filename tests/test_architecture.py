@@ -536,6 +536,14 @@ def text_files():
     return [p for p in files if p.suffix in TEXT and "__pycache__" not in p.parts]
 
 
+def test_a_part_in_whole_percent_is_written_by_one_function():
+    """Each place that wrote it by itself chose its own space and its own rounding."""
+    own = re.compile(r"\{100 \* [^{}]+:\.0f\} ?%")
+    files = [path for package in PACKAGES for path in (ROOT / package).rglob("*.py")]
+    written = [path for path in files if own.search(path.read_text(encoding="utf-8"))]
+    assert written == [ROOT / "orchestrator" / "core" / "units.py"]
+
+
 def test_no_file_holds_a_path_of_some_machine():
     files = text_files()
     assert len(files) > 80

@@ -64,6 +64,11 @@ def read_value(text: str) -> bool | float | str:
         return text
 
 
+def whole_percent(part: float, whole: float = 1.0) -> str:
+    """A part of a whole in percent, without decimals: ``28 %``."""
+    return f"{100 * part / whole:.0f} %"
+
+
 def to_unit(value: float | int | str, unit: str) -> float:
     """Convert a value to the unit that is declared for it.
 

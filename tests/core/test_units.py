@@ -5,7 +5,14 @@ import re
 
 import pytest
 
-from orchestrator.core.units import USUAL, _counts_alike, base_exponents, pint_factor, to_unit
+from orchestrator.core.units import (
+    USUAL,
+    _counts_alike,
+    base_exponents,
+    pint_factor,
+    to_unit,
+    whole_percent,
+)
 
 
 @pytest.mark.parametrize(
@@ -123,3 +130,11 @@ def test_units_that_differ_in_their_zero():
     assert to_unit("20 degC", "K") == pytest.approx(293.15, abs=1e-12)
     assert to_unit("300 K", "degC") == pytest.approx(26.85, abs=1e-12)
     assert base_exponents("degC") == (1.0, {"K": 1})
+
+
+@pytest.mark.parametrize(
+    ("part", "whole", "expected"),
+    [(0.284, 1.0, "28 %"), (1.0, 1.0, "100 %"), (-0.04, 1.0, "-4 %"), (508.4, 750, "68 %")],
+)
+def test_a_part_is_said_in_whole_percent(part, whole, expected):
+    assert whole_percent(part, whole) == expected

@@ -26,6 +26,7 @@ from orchestrator.cases.flow.limits import (
 from orchestrator.cases.flow.newton import CONVERGED, NewtonResult, grow, solve, solve_once
 from orchestrator.core.errors import InputError, PowerFlowError, few
 from orchestrator.core.options import Option
+from orchestrator.core.units import whole_percent
 
 __all__ = ["FlowLine", "FlowLoad", "FlowShunt", "FlowUnit", "PowerFlow", "solve_power_flow"]
 
@@ -290,12 +291,12 @@ def _helps(equations: FlowEquations, with_stray: Callable[[float], FlowEquations
         for part in _SHARES:
             if solve(with_stray(part)).converged:
                 return (
-                    f"It has a solution with {100 * part:.0f} % of stray_B: stray capacitances raise the voltage "
+                    f"It has a solution with {whole_percent(part)} of stray_B: stray capacitances raise the voltage "
                     "behind large reactances; lower stray_B. "
                 )
     if found is not None:
         return (
-            f"With all loads and all units' power at {100 * min(share, 0.99):.0f} % it has a solution: the lines "
+            f"With all loads and all units' power at {whole_percent(min(share, 0.99))} it has a solution: the lines "
             f"cannot carry the power asked of them. {'Is a power in kW? ' * (share < _LITTLE)}"
             "Lower P_0 or the loads, or the line reactances. "
         )

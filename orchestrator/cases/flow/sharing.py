@@ -11,6 +11,7 @@ from orchestrator.cases.flow.power_flow import FlowUnit, PowerFlow
 from orchestrator.core.errors import ErrorKind, InputError
 from orchestrator.core.options import Option
 from orchestrator.core.spelling import Text
+from orchestrator.core.units import whole_percent
 from orchestrator.systems.coupling.system import ComponentPlan
 
 _CLOSE = 1e-6  # power [MW] that may be left to the units at the slack bus beside their share
@@ -235,7 +236,7 @@ def _overload(reserves: Sequence[Reserve], change: float, left: str) -> str:
     need = worst.before + step * worst.gain
     if change > 0 and worst.most > 0:
         first = (
-            f"{worst.name} would need {100 * need / worst.most:.0f} % of its {worst.most:.4g} MW"
+            f"{worst.name} would need {whole_percent(need, worst.most)} of its {worst.most:.4g} MW"
             f"{worst.whose and f' ({worst.whose})'}"
         )
     elif change > 0:

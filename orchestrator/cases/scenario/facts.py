@@ -8,6 +8,7 @@ from orchestrator.cases.networks.load_models import in_words
 from orchestrator.cases.scenario.drawing_devices import LOAD, drawn_mw, is_dc_terminal, with_motors
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import number_of
+from orchestrator.core.units import whole_percent
 from orchestrator.systems.coupling.system import ComponentPlan
 
 # keys of ``[network]`` that name another program's data
@@ -52,7 +53,7 @@ class Facts:
         parts.append(f"{self.load_mw:.5g} MW of load ({self.load_model})")
         if self.slack:
             units = [
-                f"{name} at {p:.4g} MW ({100 * p / S_n:.0f} % of S_n = {S_n:g} MVA)"
+                f"{name} at {p:.4g} MW ({whole_percent(p, S_n)} of S_n = {S_n:g} MVA)"
                 for name, p, S_n in self.slack
             ]
             parts.append(f"slack {', '.join(units)}")

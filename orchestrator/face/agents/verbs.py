@@ -11,6 +11,7 @@ from typing import Any
 from orchestrator.cases.case import BUILT_IN, built_in_cases
 from orchestrator.cases.form.names import close_names
 from orchestrator.core.errors import InputError
+from orchestrator.core.units import whole_percent
 from orchestrator.face.agents.answers import (
     BusStrengthAnswer,
     CasesAnswer,
@@ -418,7 +419,7 @@ def _growth_elsewhere(one: Mapping[str, Any]) -> str:
 
 def _sentence(mode: Mapping[str, Any]) -> str:
     parts = list(_largest(mode["components"]).items())[:4]
-    who = ", ".join(f"{name} {100 * share:.0f} %" for name, share in parts)
+    who = ", ".join(f"{name} {whole_percent(share)}" for name, share in parts)
     return (
         f"the mode of {mode['frequency_hz']:.3f} Hz has a damping of {mode['damping_percent']:.2f} %; "
         f"in it take part {who}"

@@ -5,6 +5,7 @@ import argparse
 from rich.markup import escape
 
 from orchestrator.core.errors import InputError
+from orchestrator.core.units import whole_percent
 from orchestrator.face.api.identification import ambient, identify
 from orchestrator.face.cli.arguments import add_kept_argument, add_options
 from orchestrator.face.cli.terminal import (
@@ -78,7 +79,7 @@ def _ambient(options: argparse.Namespace) -> int:
             f"{r.start:g}–{r.stop:g}",
             f"{r.frequency_hz:.3f} ± {r.frequency_error_hz:.3f}",
             f"{r.damping_percent:.1f} ± {r.damping_error_percent:.1f}",
-            f"{100 * r.share:.0f} %",
+            whole_percent(r.share),
             r.alarm,
         )
         for r in found.table().itertuples()

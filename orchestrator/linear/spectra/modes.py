@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Vector
 from orchestrator.core.read_only import ReadOnlyTable
+from orchestrator.core.units import whole_percent
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.real_schur import RealSchur
 
@@ -198,7 +199,7 @@ class SwingGroups:
     @property
     def other_side(self) -> list[str]:
         """Components against the largest one, those that move little with their part of its motion."""
-        faint = [f"{_component(s)} ({100 * part:.0f} %)" for s, part in self.faint.items()]
+        faint = [f"{_component(s)} ({whole_percent(part)})" for s, part in self.faint.items()]
         return [_component(s) for s in self.against] or faint
 
     def words(self, most: Callable[[Sequence[str]], str]) -> str:

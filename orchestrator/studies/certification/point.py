@@ -10,6 +10,7 @@ from orchestrator.cases.case import Case
 from orchestrator.cases.form.schema import Value
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Complex, Numbers
+from orchestrator.core.units import whole_percent
 from orchestrator.linear.models.device_start import misfits_of
 from orchestrator.linear.spectra.mode_tracking import ModeSet
 from orchestrator.linear.spectra.modes import find_spectrum
@@ -137,7 +138,7 @@ def _linearised(
     result.linearised = dict(model.sources)
     result.components = [
         ", ".join(
-            f"{name} {100 * share:.0f} %"
+            f"{name} {whole_percent(share)}"
             for name, share in mode.by_component.items()
             if share >= 0.01
         )

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from orchestrator.core.errors import AnalysisError, CosimError
+from orchestrator.core.units import whole_percent
 from orchestrator.linear.models.linear_model import IDENTIFIED
 from orchestrator.linear.spectra import continuation
 from orchestrator.linear.spectra.mode_tracking import ModeSet, match
@@ -81,5 +82,5 @@ def _followed(result: ModesResult, other: ModesResult, before: Mode) -> float:
         )
     except continuation.ModesMeetError as error:
         raise AnalysisError(
-            f"the mode meets another one at {100 * error.beyond:.0f} % of the controllers' gains"
+            f"the mode meets another one at {whole_percent(error.beyond)} of the controllers' gains"
         ) from error

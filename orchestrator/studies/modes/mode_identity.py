@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from orchestrator.cases.questions.idle_values import DAMPING_CONTROLLERS
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import AnalysisError, CosimError
+from orchestrator.core.units import whole_percent
 from orchestrator.devices.fmi.instance import is_isolated, is_ours
 from orchestrator.linear.models.linear_model import IDENTIFIED, LinearModel
 from orchestrator.linear.models.steady_state import OperatingPoint
@@ -108,7 +109,8 @@ def _settle(name: str, system: NamedSystem, origin: _Origin, near: continuation.
             origin.start, way.model_at, 0.0, 1.0, way.strides, way.common, near=near
         ).eigenvalue
     except continuation.ModesMeetError as error:
-        where = f"meets another one {100 * error.beyond:.0f} % of the way from there, at {_figures(error.eigenvalue)}"
+        meeting = f"{whole_percent(error.beyond)} of the way from there"
+        where = f"meets another one {meeting}, at {_figures(error.eigenvalue)}"
         return _without(
             naming, name, f"{was} {where}, and cannot be told from it beyond", sure=sure
         )

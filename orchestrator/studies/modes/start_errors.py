@@ -12,6 +12,7 @@ from orchestrator.core.errors import ComponentError, ErrorKind, Problem, StartEr
 from orchestrator.core.options import Option
 from orchestrator.core.question_kinds import besides
 from orchestrator.core.spelling import Text
+from orchestrator.core.units import whole_percent
 from orchestrator.devices.fmi.instance import is_ours
 from orchestrator.devices.fmi.refused_calls import refuses_to_start
 from orchestrator.systems.coupling.coupled import refusal_to_start
@@ -148,7 +149,7 @@ def _cause(prepared: PreparedScenario, error: ComponentError, name: str) -> str:
     said = said.removeprefix(_PREFACE) if is_ours(plan.description.path) else said
     said = said or "the FMU says no more than that its initialisation failed"
     share, there = _share(plan), {*plan.description.variables}
-    need = f"would need {100 * share:.0f} % of what its limits allow, and " if share > 1 else ""
+    need = f"would need {whole_percent(share)} of what its limits allow, and " if share > 1 else ""
     cause = f"{name} {need}cannot start: {said}"
     if {"P_0", "Q_0", "S_n"} <= there:
         computed = prepared.power_flow is not None and name in prepared.power_flow.powers

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers
+from orchestrator.core.units import whole_percent
 from orchestrator.studies.oscillations.detection import SpectralLine, phasors
 from orchestrator.studies.oscillations.measurements import Measurements, Site
 
@@ -81,7 +82,7 @@ class _Work:
                 method, None, True, f"no place {verb} more than the noise explains", ranking
             )
         if share < _SHARE:
-            both = ", ".join(f"{n} {100 * x:.0f} %" for n, x in ranking[:3] if x > 0)
+            both = ", ".join(f"{n} {whole_percent(x)}" for n, x in ranking[:3] if x > 0)
             return Opinion(method, None, True, f"several places {verb[:-1]} it: {both}", ranking)
         if fed < _BALANCE * taken:
             part = f"{100 * fed / taken:.0f}" if fed > _LEAST_TOLD * taken else "less than 1"
@@ -92,7 +93,7 @@ class _Work:
                 f"what {verb} it is not among the places that are observed: they give {part} % of what they take",
                 ranking,
             )
-        return Opinion(method, name, True, f"{name} {verb} {100 * share:.0f} % of it", ranking)
+        return Opinion(method, name, True, f"{name} {verb} {whole_percent(share)} of it", ranking)
 
 
 def opinions(measured: Measurements, found: SpectralLine, others: Sequence[float]) -> list[Opinion]:
@@ -116,12 +117,12 @@ def _opinions(
     ratio = float(np.abs(reactive.values).max() / (np.abs(energy.values).max() or 1e-300))
     flow, phase = energy.opinion(DEF, "feeds"), reactive.opinion(QV_PHASE, "drives")
     if ratio <= _POWER:
-        why = f"it acts through active power ({100 * ratio:.0f} % as much through voltage): says nothing here"
+        why = f"it acts through active power ({whole_percent(ratio)} as much through voltage): says nothing here"
         phase = replace(phase, applies=False, place=None, reason=why)
     elif ratio >= _VOLTAGE:
         why = (
-            f"it acts through voltage ({100 * ratio:.0f} % of what it does through active power), where energy flow is "
-            f"known to point elsewhere{f', here to {flow.place}' if flow.place else ''}"
+            f"it acts through voltage ({whole_percent(ratio)} of what it does through active power), where energy flow "
+            f"is known to point elsewhere{f', here to {flow.place}' if flow.place else ''}"
         )
         flow = replace(flow, applies=False, place=None, reason=why)
     return [flow, dynamic_mode(places, measured.times, found), phase]
@@ -219,9 +220,11 @@ def dynamic_mode(places: Sequence[Site], times: Numbers, found: SpectralLine) ->
     ranking = tuple((places[k].name, float(part[k])) for k in order)
     name, share = ranking[0]
     if len(places) > 1 and share < _CONCENTRATED:
-        why = f"spread as a mode's shape is, most at {name} ({100 * share:.0f} %): does not decide"
+        why = (
+            f"spread as a mode's shape is, most at {name} ({whole_percent(share)}): does not decide"
+        )
         return Opinion(DYNAMIC_MODE, None, False, why, ranking)
-    return Opinion(DYNAMIC_MODE, name, True, f"{name} has {100 * share:.0f} % of it", ranking)
+    return Opinion(DYNAMIC_MODE, name, True, f"{name} has {whole_percent(share)} of it", ranking)
 
 
 def _doubtful(measured: Measurements) -> list[str] | str:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.core.arrays import Complex, Matrix, Numbers
+from orchestrator.core.units import whole_percent
 from orchestrator.studies.oscillations.detection import SpectralLine
 from orchestrator.studies.oscillations.location import Opinion, block_phasors, jackknife
 from orchestrator.studies.oscillations.measurements import Measurements, Site
@@ -77,7 +78,7 @@ def own_models(
     opinion = _opinion_on_a_unit(currents, rivals) or _opinion_on_a_rival(currents, rivals)
     if opinion is not None:
         return opinion
-    both = ", ".join(f"{n} {100 * x:.0f} %" for n, x in currents.ranking[:3])
+    both = ", ".join(f"{n} {whole_percent(x)}" for n, x in currents.ranking[:3])
     why = f"no place alone deviates from its model and explains the voltages (deviations: {both})"
     return Opinion(OWN_MODEL, None, True, why, currents.ranking)
 
@@ -191,7 +192,7 @@ def _opinion_on_a_unit(currents: _UnexplainedCurrents, rivals: _Rivals) -> Opini
     noisy = ", the rest being noise" if rest > _EXPLAINED else ""
     why = (
         f"{names[top]} gives a current that its own linear model does not, and that explains "
-        f"{100 * (1 - rest):.0f} % of what the voltages do{noisy}"
+        f"{whole_percent(1 - rest)} of what the voltages do{noisy}"
     )
     also = [names[k] for k, part in enumerate(parts) if k != top and part > _NOTED]
     sole = not also and currents.beyond(currents.effects[top]) < _UNEXPLAINED
@@ -224,7 +225,7 @@ def _opinion_on_a_rival(currents: _UnexplainedCurrents, rivals: _Rivals) -> Opin
     name = " or ".join(n for n, u in rivals.units.items() if u.bus == order[0]) or order[0]
     why = (
         f"the units that are observed do as their models, and a current of {name} explains "
-        f"{100 * (1 - first):.0f} % of what the voltages do"
+        f"{whole_percent(1 - first)} of what the voltages do"
     )
     unexplained = currents.beyond(currents.fit(rivals.swung[order[0]]))
     sole = max(currents.parts) < _NOTED and unexplained < _UNEXPLAINED

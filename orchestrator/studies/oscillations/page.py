@@ -7,6 +7,7 @@ import numpy as np
 
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import number_of
+from orchestrator.core.units import whole_percent
 from orchestrator.output.report.colours import colour
 from orchestrator.output.report.html.charts import ChartCurve, legend, line_chart
 from orchestrator.output.report.html.elements import SHADES, Figures, document
@@ -123,7 +124,7 @@ def _map(measured: Measurements, one: Located, others: list[float], figures: Fig
         )
     branches = [(place.bus, place.beyond) for place in measured.places if place.beyond]
     texts = {
-        bus: f"{bus}: {'feeds' if part > 0 else 'takes'} {100 * abs(part):.0f} %"
+        bus: f"{bus}: {'feeds' if part > 0 else 'takes'} {whole_percent(abs(part))}"
         for bus, part in fed.items()
     }
     seen = max(fed.values(), default=0.0) > _RED

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from orchestrator.core.units import whole_percent
 from orchestrator.output.report.column_table import ShownTable
 from orchestrator.studies.oscillations.location import DEF, DYNAMIC_MODE, QV_PHASE, Opinion
 from orchestrator.studies.oscillations.models import OWN_MODEL
@@ -39,7 +40,9 @@ def parts_of(opinion: Opinion) -> str:
     giving = [(name, share) for name, share in opinion.ranking if share >= _LEAST_PART]
     if opinion.others_give:
         return "these places take more than they give"
-    parts = ", ".join(f"{name} {100 * share:.0f} %" for name, share in giving[:_PLACES]) or "none"
+    parts = (
+        ", ".join(f"{name} {whole_percent(share)}" for name, share in giving[:_PLACES]) or "none"
+    )
     observed = [name for name, _ in opinion.ranking]
     if opinion.place is None or opinion.place in observed:
         return parts

@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from orchestrator.core.arrays import Numbers
+from orchestrator.core.units import whole_percent
 from orchestrator.studies.oscillations.close_lines import doubt, most_explained, skirt
 from orchestrator.studies.oscillations.detection import (
     Signals,
@@ -170,17 +171,17 @@ def _judge(
     ``change``: of the amplitude over the record, as a part of it, if an exponential explains the envelope; else 0.
     ``pair``: part of the envelope's power that two sines at close frequencies explain."""
     harmonics = ", ".join(
-        f"{order} x ({100 * part:.0f} %)" for order, part in found.harmonics.items()
+        f"{order} x ({whole_percent(part)})" for order, part in found.harmonics.items()
     )
     sharp = seen.envelope_spread <= _CLEAN or seen.skirt <= _SKIRT or bool(harmonics)
     steady = seen.envelope_spread < _STEADY and seen.kurtosis < _SINE and seen.coherence > _COHERENT
     figures = (
-        f"amplitude ± {100 * seen.envelope_spread:.0f} %, kurtosis {seen.kurtosis:.2f} (a sine has 1.5, noise 3), "
+        f"amplitude ± {whole_percent(seen.envelope_spread)}, kurtosis {seen.kurtosis:.2f} (a sine has 1.5, noise 3), "
         f"phase steady to {seen.coherence:.2f} of 1"
     )
     if abs(change) > _CHANGE and seen.coherence > 0.8 and not harmonics:
         way = "decays" if change < 0 else "grows"
-        trend = f"its amplitude {way}, by {100 * abs(change):.0f} % over {seen.periods:.0f} periods ({figures})"
+        trend = f"its amplitude {way}, by {whole_percent(abs(change))} over {seen.periods:.0f} periods ({figures})"
         return "mode", [trend]
     if steady and seen.disturbed and not harmonics:
         after = "a mode without damping would ring alike after the disturbance with which it begins"

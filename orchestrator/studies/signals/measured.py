@@ -8,6 +8,7 @@ import numpy as np
 
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import AnalysisError
+from orchestrator.core.units import whole_percent
 from orchestrator.linear.signals.identification import (
     IdentifiedMode,
     averaging,
@@ -97,9 +98,9 @@ def _check(times: Numbers, values: Numbers, line_frequency: float) -> None:
     share = _share_near(times, values, line_frequency)
     if share > _WAVEFORM:
         raise AnalysisError(
-            f"{100 * share:.0f} % of the signal's power lies near the line's frequency of {line_frequency:g} Hz: it is "
-            "an instantaneous voltage or current, whose electromechanical modes cannot be read; use a channel of its "
-            "RMS value, frequency, angle or power"
+            f"{whole_percent(share)} of the signal's power lies near the line's frequency of {line_frequency:g} Hz: it "
+            "is an instantaneous voltage or current, whose electromechanical modes cannot be read; use a channel of "
+            "its RMS value, frequency, angle or power"
         )
 
 

@@ -12,6 +12,7 @@ from typing import Any
 from orchestrator.core.errors import few
 from orchestrator.core.options import Option
 from orchestrator.core.truth import all_true
+from orchestrator.core.units import whole_percent
 from orchestrator.linear.spectra.modes import Mode, damping_percent, damping_ratio
 from orchestrator.output.report.column_table import ShownTable
 from orchestrator.output.report.html.elements import (
@@ -152,7 +153,7 @@ def answer_in_parts(result: SiteResult) -> tuple[str, str]:
     among = " of those asked for" if result.request.buses else ""
     if result.by_coupled:
         return _best_confirmed(result, among)
-    parts = [f"{bus} {100 * result.least(bus)[0] / most:.0f} %" for bus in best[1:]]
+    parts = [f"{bus} {whole_percent(result.least(bus)[0], most)}" for bus in best[1:]]
     others = ", ".join([*(f"{part} of that" for part in parts[:1]), *parts[1:]])
     tried = [one for one in result.confirmations if one.bus == best[0] and not one.failure]
     then = "".join(f"{_doubt(one)}; as it is now, {with_it(one)}" for one in tried)

@@ -15,6 +15,7 @@ import numpy as np
 from orchestrator.core.bisection import halve_towards
 from orchestrator.core.errors import ErrorKind, few
 from orchestrator.core.options import Option
+from orchestrator.core.units import whole_percent
 from orchestrator.linear.spectra.modes import Mode, damping_percent, make_mode
 from orchestrator.studies.sweep.point import PointRecord
 
@@ -291,5 +292,5 @@ def _who(mode: Mode, speeds: Sequence[str]) -> str:
     if mode.participation_of(states) >= 0.1 and said:
         return said
     return ", ".join(
-        f"{name} {100 * share:.0f} %" for name, share in list(mode.by_component.items())[:_PARTS]
+        f"{name} {whole_percent(share)}" for name, share in list(mode.by_component.items())[:_PARTS]
     )

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from orchestrator.core.options import Option
+from orchestrator.core.units import whole_percent
 from orchestrator.studies.validation.questions import QuestionKind
 
 Figures = Mapping[str, Any]
@@ -86,8 +87,8 @@ def _angle_unit(x: Figures) -> str:
 
 def _angle_held(x: Figures) -> str:
     return (
-        f"{100 * x['part']:.0f} % of the angle's samples are that of the sample before: the recorder holds it, and the "
-        "device sees steps that the plant did not. Give a recording with its own samples"
+        f"{whole_percent(x['part'])} of the angle's samples are that of the sample before: the recorder holds it, and "
+        "the device sees steps that the plant did not. Give a recording with its own samples"
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from orchestrator.core.errors import number_of
 from orchestrator.core.options import Option
+from orchestrator.core.units import whole_percent
 from orchestrator.linear.signals.identification import IdentifiedMode
 from orchestrator.studies.validation.beside import WindowApart
 from orchestrator.studies.validation.causes import CauseKind, Explanation, nothing_to_explain
@@ -299,7 +300,7 @@ def lasting_sentence(errors: Sequence[LastingError], *, explained: bool) -> str:
     if not errors:
         return ""
     worst, more = errors[0], len(errors) - 1
-    part = "" if worst.part is None else f", {100 * worst.part:.0f} % of its swing (rms)"
+    part = "" if worst.part is None else f", {whole_percent(worst.part)} of its swing (rms)"
     others = f", and {number_of(more, 'signal')} more" if more else ""
     hint = "" if explained else f": type {Option.EXPLAIN}, which looks for the cause"
     return (
@@ -455,7 +456,7 @@ def explanation_cells(one: Explanation) -> tuple[str, ...]:
         value_text(one.now),
         f"{value_text(one.value)}{beside}",
         f"{one.left:.4g} of {one.error:.4g}",
-        f"{100 * one.share:.0f} %",
+        whole_percent(one.share),
         _likely(one),
     )
 
@@ -539,7 +540,7 @@ def _said_of_causes(explanations: Sequence[Explanation], *, finished: bool, in_s
     if not explanations:
         return "No cause that was tried leaves less of the error."
     best = explanations[0]
-    part = f"{100 * best.share:.0f} % of the squared error beyond the recording's own noise"
+    part = f"{whole_percent(best.share)} of the squared error beyond the recording's own noise"
     if best.cause in (CauseKind.LAG, CauseKind.CLOCK):
         return f"The likeliest cause is {_cause(best)}: it explains {part}, and no parameter was tried beside it."
     if best.stands_in:

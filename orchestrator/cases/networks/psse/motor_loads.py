@@ -18,6 +18,7 @@ from orchestrator.cases.networks.psse.raw_network import FileLoad
 from orchestrator.cases.networks.psse.records_of_loads import RecordsOfLoads
 from orchestrator.cases.networks.psse.refusals import Refusals
 from orchestrator.core.errors import InputError, Problem, QuestionTopic, few, number_of
+from orchestrator.core.units import whole_percent
 
 MOTOR_NAMES = {
     f"{model}{subsystem}": record
@@ -112,9 +113,10 @@ def motor_remarks(motors: Sequence[MotorLoad], load_mw: float) -> Iterator[Probl
         buses = few([bus_of(str(motor.load.bus)) for motor in own], _SHOWN)
         saturated = any(_saturates(motor.record) for motor in own)
         text = (
-            f"{name}: {number_of(len(own), 'induction motor')} for {p_mw:.4g} MW of load ({100 * p_mw / load_mw:.0f} "
-            f"%; {buses}). Beside a load that follows the voltage alone, a motor's slip answers to voltage and "
-            "frequency within tenths of a second, which moves the damping of modes, and it has modes of its own (`w` "
+            f"{name}: {number_of(len(own), 'induction motor')} for {p_mw:.4g} MW of load "
+            f"({whole_percent(p_mw, load_mw)}; {buses}). "
+            "Beside a load that follows the voltage alone, a motor's slip answers to voltage and frequency within "
+            "tenths of a second, which moves the damping of modes, and it has modes of its own (`w` "
             f"of {own[0].name}); to see how much, leave them out: dyr_leave_out = ['{name}'] in [units]"
         )
         if saturated:

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.core.errors import ComponentError
+from orchestrator.core.units import whole_percent
 from orchestrator.devices.acceptance.checks.base import (
     SAME,
     CheckResult,
@@ -55,7 +56,7 @@ def sample_time(subject: Subject) -> CheckResult:
             )
         said = f"its outputs change every {_seconds(finer)} only; with steps of {_seconds(h)} that is every step"
         return passed("sample_time", said, sample_time=finer)
-    part = f"{100 * (1 - h / own):.0f} % of all steps of {_seconds(h)}"
+    part = f"{whole_percent(1 - h / own)} of all steps of {_seconds(h)}"
     idle = f"its outputs change every {_seconds(own)} only: {part} do nothing"
     if own > _IDLE * h and subject.step_is_given:
         return failed("sample_time", "step not honoured", idle, sample_time=own)

@@ -9,6 +9,7 @@ import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.core.errors import ComponentError
+from orchestrator.core.units import whole_percent
 from orchestrator.devices.acceptance.checks import droop as droops
 from orchestrator.devices.acceptance.checks.base import (
     SAME,
@@ -171,12 +172,12 @@ def _evenly(giving: CheckResult, taking: CheckResult) -> CheckResult:
         result.figures["Q_in_parts_of_the_first_cycle"] for result in (giving, taking)
     )
     if settled and min(kept, kept_now) < 1 - _TURNED and max(kept, kept_now) > 1 + _TURNED:
-        left = f"{100 * kept_now:.0f} % are left in the end"
+        left = f"{whole_percent(kept_now)} are left in the end"
         says = f"of the reactive power that less voltage brings in the first cycle {left} "
         return failed(
             "signs",
             "uneven droop",
-            f"{says}while it takes power, and {100 * kept:.0f} % while it gives some",
+            f"{says}while it takes power, and {whole_percent(kept)} while it gives some",
             **taking.figures,
         )
     return taking

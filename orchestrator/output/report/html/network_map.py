@@ -8,6 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import shortest_path
 
 from orchestrator.core.arrays import Matrix
+from orchestrator.core.units import whole_percent
 
 # the size of the map, and the margin in which labels have room [units of the view box]
 WIDTH = 720
@@ -36,7 +37,7 @@ def network_map(
         for a, b in branches
     ]
     for (a, b), part in flows.items():
-        parts += _arrow(at[a], at[b], part, f"{a} → {b}: {100 * part:.0f} %")
+        parts += _arrow(at[a], at[b], part, f"{a} → {b}: {whole_percent(part)}")
     for bus, place in at.items():
         share = min(max(heat[bus], 0.0), 1.0)
         parts.append(_circle(place, share, texts[bus]))

@@ -6,6 +6,7 @@ finding says that it is this program's reading."""
 import numpy as np
 
 from orchestrator.core.arrays import Numbers
+from orchestrator.core.units import whole_percent
 from orchestrator.devices.binding.misfits import NO_LIMIT
 from orchestrator.simulation.watch.limits import ABOVE, LASTS, told_of
 from orchestrator.studies.certification.codes.bench_point import CAPACITANCE, PLANT
@@ -236,7 +237,7 @@ def responds_within(event: int, sign: int, longest: float, share: float = 0.9) -
             if np.isfinite(taken)
             else "it does not respond against the jump"
         )
-        rule = f"{100 * share:.0f} % of the first change within {1e3 * longest:g} ms"
+        rule = f"{whole_percent(share)} of the first change within {1e3 * longest:g} ms"
         return _finding(f"speed at {time:g} s", rule, CODE, taken, longest, text, unit="s")
 
     return judge

@@ -8,6 +8,7 @@ from math import pi
 import numpy as np
 
 from orchestrator.core.arrays import Numbers
+from orchestrator.core.units import whole_percent
 from orchestrator.studies.certification.codes import criteria as c
 from orchestrator.studies.certification.codes.envelope import (
     CEILING,
@@ -211,7 +212,7 @@ def _jumps(declared: Mapping[str, float], scr: float, power: float) -> CodeRow:
 
     return _row(
         _row_name("igfm1", scr, power),
-        f"∓{np.degrees(angle):.2g}° at SCR {scr:g}, {100 * power:.0f} %",
+        f"∓{np.degrees(angle):.2g}° at SCR {scr:g}, {whole_percent(power)}",
         programme,
         stays_inside(0, partial(envelope, -1), "power after the jump ahead"),
         stays_inside(1, partial(envelope, 1), "power after the jump back"),
@@ -235,7 +236,7 @@ def _steps(declared: Mapping[str, float], scr: float, power: float) -> CodeRow:
 
     return _row(
         _row_name("igfm2", scr, power),
-        f"Source ∓{100 * CURRENT * X:.2g} % at SCR {scr:g}, {100 * power:.0f} %",
+        f"Source ∓{100 * CURRENT * X:.2g} % at SCR {scr:g}, {whole_percent(power)}",
         programme,
         stays_inside(0, partial(envelope, -1), "current after the rise", reactive_current),
         stays_inside(2, partial(envelope, 1), "current after the fall", reactive_current),
@@ -258,7 +259,7 @@ def _strength(declared: Mapping[str, float], start: float, end: float, power: fl
 
     return _row(
         _row_name("igfm3", start, power, f"_scr{end:g}"),
-        f"SCR {start:g} → {end:g}, {100 * power:.0f} %",
+        f"SCR {start:g} → {end:g}, {whole_percent(power)}",
         programme,
         stays_inside(0, envelope, "power after the step"),
     )
@@ -278,7 +279,7 @@ def _ramping(
     name = _row_name("igfm4", scr, power, f"_{rate:g}".replace(".", "_"))
     return _row(
         name,
-        f"±{rate:g} Hz/s for {lasts:g} s at SCR {scr:g}, {100 * power:.0f} %",
+        f"±{rate:g} Hz/s for {lasts:g} s at SCR {scr:g}, {whole_percent(power)}",
         programme,
         stays_inside(2, partial(envelope, -1), "power while the frequency rises", skipped=2),
         stays_inside(4, partial(envelope, 1), "power while the frequency falls", skipped=2),
