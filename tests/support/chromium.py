@@ -8,6 +8,23 @@ import pytest
 CHROMIUM = (
     shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 )
+# The list of boxes below the address, which no test opens, is a process of its own for each window: half a second of
+# processor. The others are those of Playwright, which a list of ours replaces.
+_WITHOUT = (
+    "WebUIOmniboxPopup",
+    "WebUIOmniboxAimPopup",
+    "AimEnabled",
+    "AvoidUnnecessaryBeforeUnloadCheckSync",
+    "DestroyProfileOnBrowserClose",
+    "HttpsUpgrades",
+    "LensOverlay",
+    "MediaRouter",
+    "NetworkTimeServiceQuerying",
+    "OptimizationHints",
+    "PaintHolding",
+    "PreconnectToSearch",
+    "ThirdPartyStoragePartitioning",
+)
 # No services of its own: a page is a file, and tests run where there is no network.
 OPTIONS = [
     "--no-sandbox",
@@ -17,6 +34,7 @@ OPTIONS = [
     "--disable-component-update",
     "--disable-sync",
     "--disable-quic",
+    f"--disable-features={','.join(_WITHOUT)}",
 ]
 NEEDED = "needs chromium (Debian: apt-get install chromium)"
 

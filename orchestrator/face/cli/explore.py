@@ -18,6 +18,7 @@ from orchestrator.face.cli.arguments import add_options
 from orchestrator.face.cli.case_arguments import add_trust_argument, values_set
 from orchestrator.face.cli.progress_lines import both, progress_lines
 from orchestrator.face.cli.terminal import make_console, saying_warnings
+from orchestrator.face.explore.copies import begin_imports
 from orchestrator.face.explore.opened import opened
 from orchestrator.face.explore.saved import save_page
 from orchestrator.face.explore.server import Explorer
@@ -75,6 +76,7 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(
             "--vary is for a page that is saved; give --save FILE.html as well, or drag the slider"
         )
+    begin_imports()  # while the browser starts
     explorer = Explorer(word, beginning, port=options.port, trust_fmus=options.trust_fmus)
     print(
         f"{explorer.address}  (ends by Ctrl-C, or a minute after its last page was closed)",

@@ -1,17 +1,15 @@
 """A process that answers questions, from the side of the server: one at a time, the last of each asker goes first."""
 
 import json
-import os
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
 from itertools import count
-from pathlib import Path
 from typing import Any
 
 from orchestrator.core.errors import ErrorKind
+from orchestrator.face.explore.copies import Copy, Process, begun
 
 Answer = dict[str, Any]
 
@@ -19,7 +17,6 @@ Asker = tuple[str, str]  # a page, and the kind of its question
 LONGEST = 3600.0  # a computation that takes longer is ended [s]
 _RESTART = 3.0  # to start the process anew takes about so long [s]
 _TO_LEAVE = 3.0  # until a process that was asked to end is killed [s]
-_ROOT = str(Path(__file__).parents[3])
 
 
 class Computing:
@@ -41,7 +38,7 @@ class Computing:
         self._cancelled: dict[str, float] = {}  # of each page, the number of its last cancel
         self._at_work: tuple[Asker, float] | None = None  # and when it began
         self._took: dict[str, float] = {}
-        self._process: subprocess.Popen[str] | None = None
+        self._process: Process | None = None
         self._why = ""
         self._closed = False
 
@@ -142,22 +139,13 @@ class Computing:
         )
         return f"the process that computes ended by itself ({how}){detail}: {text}"
 
-    def _running(self) -> "subprocess.Popen[str]":
+    def _running(self) -> Process:
         with self._state:
             if self._closed or self._why:  # it was ended before it began
                 raise OSError("nobody waits for it")
             if self._process is not None and self._process.poll() is None:
                 return self._process
-            path = os.pathsep.join([_ROOT, *filter(None, [os.environ.get("PYTHONPATH")])])
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "orchestrator.face.explore.worker"],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                text=True,
-                encoding="utf-8",
-                env={**os.environ, "PYTHONPATH": path},
-                start_new_session=True,
-            )
+            self._process = begun()
             assert self._process.stdin is not None
             self._process.stdin.write(json.dumps(self._given) + "\n")
             self._process.stdin.flush()
@@ -167,12 +155,16 @@ class Computing:
         self._why = why
         process, self._process = self._process, None
         if process is not None:
-            process.terminate()
-            threading.Thread(target=_killed, args=(process,), daemon=True).start()
+            is_there = not isinstance(process, Copy) or process.is_there
+            if is_there:
+                process.terminate()
+            threading.Thread(target=_killed, args=(process, is_there), daemon=True).start()
 
 
-def _killed(process: "subprocess.Popen[str]") -> None:
-    """See to it that a process that was asked to end does."""
+def _killed(process: Process, was_asked: bool) -> None:
+    """See to it that a process that was asked to end does; one that is yet to begin is asked once it has."""
+    if not was_asked:
+        process.terminate()
     try:
         process.wait(_TO_LEAVE)
     except subprocess.TimeoutExpired:

@@ -377,9 +377,14 @@ def main() -> None:
             )
 
 
-if __name__ == "__main__":
+def serve() -> None:
+    """Do so, and end where it is told to or where nobody reads the answers."""
     with calls.terminable(ending=True), as_options():
         try:
             main()
         except (KeyboardInterrupt, BrokenPipeError):
             os._exit(1)
+
+
+if __name__ == "__main__":
+    serve()

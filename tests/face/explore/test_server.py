@@ -12,6 +12,7 @@ import sys
 import threading
 import time
 import tomllib
+from types import SimpleNamespace
 
 import pytest
 
@@ -22,6 +23,7 @@ from fmus.toolchain.python_fmu import PythonFmu
 from fmus.toolchain.temporary import own_folder, remove
 from orchestrator.face.cli import main
 from orchestrator.face.cli.explore import first_shown, way_to
+from orchestrator.face.explore import copies
 from orchestrator.face.explore.computing import Computing
 from orchestrator.face.explore.files import FILES, SCRIPTS, content_of
 from orchestrator.face.explore.server import Explorer
@@ -305,6 +307,46 @@ def test_a_dead_process_ends_its_question_and_not_the_next(computing):
     found = answer(computing, say=lambda part: os.kill(process, signal.SIGKILL), **slopes)
     assert "signal 9" in found["error"]
     assert "answer" in answer(computing)
+
+
+@pytest.mark.slow
+def test_the_process_that_was_copied_is_begun_anew_where_it_died(computing):
+    assert "answer" in answer(computing)
+    before = copies._original._process
+    before.kill()
+    before.wait()
+    assert "answer" in answer(computing)  # of a copy, which outlives it
+    other = Computing("two_area")
+    assert "answer" in other.ask("p", {"ask": "open"}, lambda part: None)
+    assert copies._original._process.pid != before.pid
+    other.close()
+
+
+@pytest.mark.slow
+def test_a_process_that_is_cancelled_before_it_has_begun_ends(computing):
+    """Who cancels does not wait for it."""
+    assert "answer" in answer(computing)
+    original, found = copies._original._process.pid, Computing("two_area")
+    os.kill(original, signal.SIGSTOP)  # as if it were at its imports
+    at_work = in_background(found, number=1)
+    wait_until(lambda: found._process is not None)
+    begun = found._process
+    found.cancel("p", 2)
+    assert begun.poll() is None
+    os.kill(original, signal.SIGCONT)
+    assert at_work() == {"cancelled": True}
+    assert begun.wait(30) != 0
+    found.close()
+
+
+@pytest.mark.slow
+def test_where_no_process_is_copied_each_does_its_imports(monkeypatch):
+    elsewhere = SimpleNamespace(platform="darwin", executable=sys.executable)
+    monkeypatch.setattr(copies, "sys", elsewhere)
+    found = Computing("two_area")
+    assert "answer" in found.ask("p", {"ask": "open"}, lambda part: None)
+    assert isinstance(found._process, subprocess.Popen)
+    found.close()
 
 
 @pytest.mark.parametrize("running", [False, True])

@@ -1,0 +1,176 @@
+"""Processes that compute for the page, from the side of the server: on Linux copies of one that has done the imports.
+
+The imports are 1.4 s of processor, and a page has four such processes; one that was ended is there again in 10 ms. The
+server itself cannot be copied safely, for it has threads. Elsewhere than on Linux system libraries object to copies,
+and every process does its imports itself."""
+
+import atexit
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from contextlib import suppress
+from pathlib import Path
+from typing import IO
+
+_ROOT = str(Path(__file__).parents[3])
+_NUMBER = 64
+"""Bytes that hold the number of a process, or the code that it ended with."""
+_UNKNOWN = 255
+"""The code of a process of whose end nobody tells, because whoever watched it was ended as well."""
+
+
+class Copy:
+    """A process that was copied, with what `subprocess.Popen` has of one."""
+
+    def __init__(self, line: socket.socket, stdin: IO[str], stdout: IO[str]) -> None:
+        self._line, self.stdin, self.stdout = line, stdin, stdout
+        self._told = threading.Lock()
+        self._pid = 0
+        self.returncode: int | None = None
+
+    @property
+    def pid(self) -> int:
+        """Its number, for which the first one who asks waits until the imports are done."""
+        with self._told:
+            self._hear_number(None)
+            return self._pid
+
+    @property
+    def is_there(self) -> bool:
+        """Say whether the imports were done, so that it can be told to end without a wait."""
+        with self._told:
+            self._hear_number(0.0)
+            return self._pid != 0
+
+    def _hear_number(self, timeout: float | None) -> None:
+        if not self._pid and select.select([self._line], [], [], timeout)[0]:
+            self._pid = int(self._line.recv(_NUMBER) or b"-1")
+
+    def poll(self) -> int | None:
+        return self._looked(0.0)
+
+    def wait(self, timeout: float | None = None) -> int:
+        code = self._looked(timeout)
+        if code is None:
+            raise subprocess.TimeoutExpired("gfor explore", timeout or 0.0)
+        return code
+
+    def terminate(self) -> None:
+        self._send(signal.SIGTERM)
+
+    def kill(self) -> None:
+        self._send(signal.SIGKILL)
+
+    def _send(self, number: int) -> None:
+        if self.poll() is None and self.pid > 0:
+            with suppress(ProcessLookupError):
+                os.kill(self.pid, number)
+
+    def _looked(self, timeout: float | None) -> int | None:
+        with self._told:
+            if self.returncode is None:
+                self._hear_number(timeout)
+                if self._pid and select.select([self._line], [], [], timeout)[0]:
+                    self.returncode = int(self._line.recv(_NUMBER) or _UNKNOWN)
+                    self._line.close()
+            return self.returncode
+
+
+Process = subprocess.Popen[str] | Copy
+
+
+class _Original:
+    """The process that the others are copies of, begun with the first of them, and again after it died."""
+
+    def __init__(self) -> None:
+        self._begun = threading.Lock()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._asking: socket.socket | None = None
+
+    def copied(self) -> Copy:
+        """A copy with this process' environment, folder and standard error, at the head of a session of its own."""
+        line, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        questions, stdin = os.pipe()
+        stdout, answers = os.pipe()
+        asked = json.dumps({"env": _environment(), "folder": os.getcwd()}).encode()
+        given = [theirs.fileno(), questions, answers, 2]
+        try:
+            with self._begun:
+                try:
+                    socket.send_fds(self._line(), [asked], given)
+                except (BrokenPipeError, ConnectionResetError):  # it was ended
+                    self.close()
+                    socket.send_fds(self._line(), [asked], given)
+        finally:
+            theirs.close()
+            os.close(questions)
+            os.close(answers)
+        return Copy(
+            line, os.fdopen(stdin, "w", encoding="utf-8"), os.fdopen(stdout, encoding="utf-8")
+        )
+
+    def begin(self) -> None:
+        with self._begun:
+            self._line()
+
+    def _line(self) -> socket.socket:
+        if self._asking is None:
+            self._asking, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+            with theirs:
+                self._process = subprocess.Popen(
+                    _words("original"),
+                    stdin=theirs.fileno(),
+                    stdout=subprocess.DEVNULL,
+                    env=_environment(),
+                    start_new_session=True,
+                )
+        return self._asking
+
+    def close(self) -> None:
+        """Have it end; its copies end when nobody asks them any more."""
+        asking, process, self._asking, self._process = self._asking, self._process, None, None
+        if asking is not None:
+            asking.close()
+        if process is not None:
+            process.kill()
+            process.wait()
+
+
+_original = _Original()
+atexit.register(_original.close)
+
+
+def begin_imports() -> None:
+    """Do the imports while nobody waits for them yet."""
+    if sys.platform == "linux":
+        _original.begin()
+
+
+def begun() -> Process:
+    """A process that computes for the page; it has yet to be told the case."""
+    if sys.platform == "linux":
+        with suppress(OSError):  # an environment that is too long for a message
+            return _original.copied()
+    return subprocess.Popen(
+        _words("worker"),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        encoding="utf-8",
+        env=_environment(),
+        start_new_session=True,
+    )
+
+
+def _words(module: str) -> list[str]:
+    return [sys.executable, "-P", "-m", f"orchestrator.face.explore.{module}"]
+
+
+def _environment() -> dict[str, str]:
+    path = os.pathsep.join([_ROOT, *filter(None, [os.environ.get("PYTHONPATH")])])
+    return {**os.environ, "PYTHONPATH": path}
