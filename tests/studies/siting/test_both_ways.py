@@ -1,6 +1,8 @@
 """A POD's place by following the swings, as in a large network, by one Schur form for all settings, and by all
 eigenvalues of every setting: the same."""
 
+from functools import cache
+
 import pytest
 
 from orchestrator.cases.case import load_case
@@ -13,18 +15,22 @@ CLOSE = 1e-6
 PLACES = (("wscc9", "pod_p"), ("wscc9", "pod_q"), ("ieee39", "pod_p"))
 
 
-@pytest.fixture
-def settings(monkeypatch):
-    """Settings whose eigenvalues were all computed."""
-    found = set()
-    whole = least_damping.LeastDamping.all_values
+def sites(case, device):
+    """The ranking with a confirmation, and of how many settings all eigenvalues were computed."""
+    settings, whole = set(), least_damping.LeastDamping.all_values
 
     def all_values(self, setting):
-        found.add(setting)
+        settings.add(setting)
         return whole(self, setting)
 
-    monkeypatch.setattr(least_damping.LeastDamping, "all_values", all_values)
-    return found
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(least_damping.LeastDamping, "all_values", all_values)
+        found = find_sites(load_case(case), SiteRequest(device, confirm=1))
+    return found.ranking, found.confirmations, len(settings)
+
+
+all_eigenvalues = cache(sites)
+"""By all eigenvalues of every setting; each way is held against it."""
 
 
 def by_following(monkeypatch):
@@ -51,16 +57,12 @@ def by_one_form(monkeypatch):
         *((*places, way) for places in PLACES for way in (by_following, by_one_form)),
     ],
 )
-def test_a_place_has_the_same_figures_both_ways(case, device, way, settings, monkeypatch):
-    request = SiteRequest(device, confirm=1)
-    whole = find_sites(load_case(case), request)
-    every = len(settings)
-    settings.clear()
+def test_a_place_has_the_same_figures_both_ways(case, device, way, monkeypatch):
+    ranking, (other,), every = all_eigenvalues(case, device)
     way(monkeypatch)
-    followed = find_sites(load_case(case), request)
-    assert len(settings) < every
-    assert followed.ranking == whole.ranking
-    (one,), (other,) = followed.confirmations, whole.confirmations
+    same, (one,), few = sites(case, device)
+    assert few < every
+    assert same == ranking
     assert (one.bus, one.stable, one.failure) == (other.bus, other.stable, "")
     assert one.setting == other.setting
     assert one.search.next_gain == other.search.next_gain
