@@ -40,6 +40,15 @@ _LASTS = 0.01
 _FAST = 5
 """Lowest frequency [Hz] that is told from a drift within a second."""
 
+LOWERED = 0.02
+"""Voltage [pu] by which a device's bus is lowered to see if its current follows at once."""
+
+AT_ONCE = 0.5
+"""Part of the answer over a period that a current gives before any step from which on it is algebraic."""
+
+_PERIOD = 0.02
+"""Time [s] over which an answer is compared with what is there at once."""
+
 _OF_ONE_LINE = 0.5
 """Least share of a movement's power that its strongest line has where the movement is called by that frequency."""
 
@@ -67,6 +76,37 @@ class Bench:
     @property
     def saves_state(self) -> bool:
         return self.description.can_save_state if self.restore is None else self.restore
+
+    def opened(self) -> Component:
+        """Return a new instance of the device."""
+        return open_component("box", self.description, isolated=self.isolated)
+
+    def initialize(self, component: Component) -> None:
+        """Bring an instance to its start with the inputs at rest."""
+        component.setup(0.0, None)
+        component.set(self.parameters)
+        component.enter_initialization_mode()
+        component.set(dict(self.held) | dict(zip(self.inputs, self.rest.tolist(), strict=True)))
+        component.exit_initialization_mode()
+
+    def follows_at_once(self) -> bool:
+        """Return whether the outputs are a function of the first input, as a phasor model's current of the voltage is.
+
+        Most of what they answer over a period is there before any step."""
+        lowered = self.rest - LOWERED * np.eye(len(self.rest))[0]
+        with self.opened() as component:
+            self.initialize(component)
+            inputs, outputs = (RealBatch(component, names) for names in (self.inputs, self.outputs))
+            before = outputs.read().copy()
+            inputs.values[:] = lowered
+            inputs.write()
+            at_once = outputs.read() - before
+            if not at_once.any():
+                return False
+            held = np.tile(lowered, (round(_PERIOD / self.step_size), 1))
+            names = self.inputs, self.outputs
+            settled = drive(component, names, held, self.step_size, 0)[-1] - before
+        return bool(np.linalg.norm(at_once) > AT_ONCE * np.linalg.norm(settled))
 
     @contextmanager
     def runs(self) -> Iterator["Runs"]:
@@ -145,15 +185,8 @@ class Runs:
             component.close()
 
     def _start(self) -> None:
-        bench = self._bench
-        component = self._component = open_component(
-            "box", bench.description, isolated=bench.isolated
-        )
-        component.setup(0.0, None)
-        component.set(bench.parameters)
-        component.enter_initialization_mode()
-        component.set(dict(bench.held) | dict(zip(bench.inputs, bench.rest.tolist(), strict=True)))
-        component.exit_initialization_mode()
+        component = self._component = self._bench.opened()
+        self._bench.initialize(component)
         self._index = 0
 
     def _rewind(self) -> None:

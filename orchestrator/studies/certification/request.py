@@ -7,11 +7,12 @@ from pathlib import Path
 
 from orchestrator.cases.form.schema import Value
 from orchestrator.core.asked import as_number
-from orchestrator.core.errors import InputError
+from orchestrator.core.errors import CosimError, InputError
 from orchestrator.core.options import Option
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.devices.fmi.port_mapping import PHASOR_PORT, BoundDescription
 from orchestrator.devices.fmi.values import as_text
+from orchestrator.studies.black_box.port import bench_at
 
 # values of X_L in the norm [pu, 100 MVA]
 REACTANCES = (0.01, *(round(0.05 * k, 2) for k in range(1, 13)))
@@ -19,6 +20,9 @@ PODS = ("none", "p", "q", "pq")
 STUDY = ("sg1", "sg2", "grid")  # components of the study that are not the converter
 GIVEN = ("S_n", "S_base", "f_n", "P_0", "Q_0", "v_0", "theta_0", "connected")
 """Values of the converter that a study gives it: that of the norm, and the bench of the other codes."""
+STEP = 1e-4
+"""Communication step [s] with which a device is asked."""
+_PORT = ("v_re", "v_im", "i_re", "i_im")
 
 
 @dataclass(frozen=True)
@@ -79,12 +83,33 @@ def refuse_phasors(request: CertificationRequest) -> None:
 
     Raises an `InputError` if the FMU gives an emf behind an admittance."""
     if {*PHASOR_PORT} <= {*bound_fmu(request.fmu, request.binding).outputs}:
-        raise InputError(
-            f"{request.fmu}: it is a phasor model (its outputs {', '.join(PHASOR_PORT)} are an emf behind an "
-            "admittance), and the networks of the codes' tests are EMT ones, whose voltage its current would follow "
-            "at once; give the converter's EMT model. `gfor modes` tells the damping of a phasor model in a case "
-            "whose network is of phasors"
-        )
+        emf = f"its outputs {', '.join(PHASOR_PORT)} are an emf behind an admittance"
+        raise InputError(_phasors_refused(request, emf))
+
+
+def refuse_what_follows_at_once(request: CertificationRequest) -> None:
+    """Refuse a phasor model under other names: its current answers the voltage before any step.
+
+    An FMU that cannot be asked so is not refused here: the tests tell what is wrong with it.
+    Raises an `InputError` if most of what its current answers over a period is there at once."""
+    description = bound_fmu(request.fmu, request.binding)
+    if not {*_PORT} <= {*description.inputs, *description.outputs}:
+        return
+    try:
+        follows = bench_at(description, request.values, STEP).follows_at_once()
+    except CosimError:
+        return
+    if follows:
+        answers = "its current answers a change of the voltage before any step"
+        raise InputError(_phasors_refused(request, answers))
+
+
+def _phasors_refused(request: CertificationRequest, because: str) -> str:
+    return (
+        f"{request.fmu}: it is a phasor model ({because}), and the networks of the codes' tests are EMT ones, whose "
+        "voltage its current would follow at once; give the converter's EMT model. `gfor modes` tells the damping "
+        "of a phasor model in a case whose network is of phasors"
+    )
 
 
 def read_reactances(text: str) -> tuple[float, ...]:

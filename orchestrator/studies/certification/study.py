@@ -23,6 +23,7 @@ from orchestrator.studies.certification.request import (
     CertificationRequest,
     rated_frequency,
     refuse_phasors,
+    refuse_what_follows_at_once,
 )
 from orchestrator.studies.points.executor import Executor
 from orchestrator.studies.points.points import CountReport, Work, nobody
@@ -64,6 +65,7 @@ def certify(
         request, folder, "in the study's case that `gfor certify` makes from the request"
     ) as trial:
         laid(trial, before=0)
+    refuse_what_follows_at_once(request)
     prepared = laid(folder, before=2)
     tasks = tasks_of(prepared, request, controllers)
     work = Work.into(folder, executor, report)

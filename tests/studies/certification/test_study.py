@@ -5,6 +5,7 @@ import shutil
 import time
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from pathlib import Path
 from unittest import mock
 
@@ -30,11 +31,16 @@ from orchestrator.studies.certification.figures import fit_errors_of, linearised
 from orchestrator.studies.certification.files import figures_of, save
 from orchestrator.studies.certification.judgement import judge, watched
 from orchestrator.studies.certification.point import FREQUENCY, POWER, PointResult
-from orchestrator.studies.certification.request import REACTANCES, CertificationRequest
+from orchestrator.studies.certification.request import (
+    REACTANCES,
+    CertificationRequest,
+    refuse_what_follows_at_once,
+)
 from orchestrator.studies.certification.study import certify
 from orchestrator.studies.points.processes import Processes
 from tests.studies.certification.fabricated import figures, rings
 from tests.studies.certification.sign_turned import turned
+from tests.support import vendor
 from tests.support.exact import exact_continuous
 from tests.support.interruption import interrupted_after
 from tests.support.scenarios import prepare_one
@@ -170,6 +176,29 @@ def test_a_phasor_model_is_not_failed_for_a_network_where_it_cannot_stand(
 ):
     with pytest.raises(InputError, match=r"it is a phasor model .* give the converter's EMT model"):
         tested(CertificationRequest(fmu_path("gfor_phasor")), tmp_path)
+
+
+@pytest.mark.parametrize("code", ["nts631", "tr331"])
+def test_a_phasor_model_under_other_names_is_refused(code, tmp_path, gfor):
+    """Its current is a function of the voltage, which no name of a variable tells."""
+    fmu = vendor.device(tmp_path, ALGEBRAIC=1)
+    out = tmp_path / "out"
+    words = ("--binding", vendor.binding(tmp_path), "--code", code, "--no-check", "--out", out)
+    ended, _, said = gfor("certify", fmu, *words)
+    assert ended == 2
+    assert said.count("error: ") == 1
+    assert "it is a phasor model (its current answers a change of the voltage before any" in said
+    assert "give the converter's EMT model" in said
+
+
+@pytest.mark.parametrize(
+    ("defines", "follows"), [({"ALGEBRAIC": 1}, True), ({"SHUNT": 0.05}, False), ({}, False)]
+)
+def test_a_current_that_is_a_state_follows_no_voltage_at_once(defines, follows, tmp_path):
+    """Beside a resistor at its terminals as well, whose current does."""
+    request = CertificationRequest(vendor.device(tmp_path, **defines), vendor.binding(tmp_path))
+    with pytest.raises(InputError, match="phasor model") if follows else nullcontext():
+        refuse_what_follows_at_once(request)
 
 
 def test_what_cannot_be_used_is_said_at_once(tmp_path, fmu_path, capsys):

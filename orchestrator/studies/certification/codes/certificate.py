@@ -15,6 +15,7 @@ from orchestrator.studies.certification.request import (
     CertificationRequest,
     rated_frequency,
     refuse_phasors,
+    refuse_what_follows_at_once,
 )
 from orchestrator.studies.points.executor import Executor
 from orchestrator.studies.points.points import CountReport, Work, nobody
@@ -41,6 +42,7 @@ def certify_code(
     chosen = [row for row in code.rows if not rows or row.name in rows]
     with refusing(request, folder, "on the test bench of `gfor certify --code`") as trial:
         _prepare_rows(request, chosen[:1], f_n, trial)
+    refuse_what_follows_at_once(request)
     report(0, len(chosen))
     prepared = _prepare_rows(request, chosen, f_n, folder)
     tasks = [
