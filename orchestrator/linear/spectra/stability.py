@@ -125,11 +125,8 @@ class Hidden:
     @property
     def _is_of_direct_currents(self) -> bool:
         """Return whether the least damped mode is one of the network at its rated frequency."""
-        if self.rated_hz is None or self.least_damped in self.electromechanical:
-            return False
-        return (
-            self._percent >= 0 and abs(self._hertz - self.rated_hz) <= _NEAR_RATED * self.rated_hz
-        )
+        least = self.least_damped
+        return least not in self.electromechanical and _is_of_direct_currents(least, self.rated_hz)
 
     @property
     def _lowest_swing(self) -> float:
@@ -142,6 +139,13 @@ class Hidden:
     @property
     def _percent(self) -> float:
         return 0.0 if self.least_damped is None else damping_percent(self.least_damped)
+
+
+def _is_of_direct_currents(value: complex | None, rated_hz: float | None) -> bool:
+    """Return whether an eigenvalue [rad/s] is of the network near its rated frequency [Hz], and does not grow."""
+    if value is None or rated_hz is None or damping_percent(value) < 0:
+        return False
+    return abs(value.imag / (2 * np.pi) - rated_hz) <= _NEAR_RATED * rated_hz
 
 
 @dataclass(frozen=True)
@@ -174,6 +178,8 @@ class Stability(NoTruth):
         States that take part most where several eigenvalues are zero; none where no component gives derivatives.
     hidden_by_step
         The communication step [s] with which nothing grows, though the system grows without one; None elsewhere.
+    rated_hz
+        The rated frequency of the network [Hz]; None where it is not known.
 
     Examples
     --------
@@ -199,6 +205,7 @@ class Stability(NoTruth):
     common_speed: tuple[str, ...] = ()  # the machines' speeds where they drift alike
     of_zeros: tuple[str, ...] = ()  # states that take part most in several zeros
     hidden_by_step: float | None = None  # step [s] with which nothing grows, though the system does
+    rated_hz: float | None = None  # rated frequency of the network [Hz]
 
     @property
     def only_common_speed(self) -> bool:
@@ -247,7 +254,12 @@ class Stability(NoTruth):
             tail += f"; {zeros_in_words(self.zeros, self.of_zeros)}"
         if self.stable:
             where = self._where(self.mode)
-            return f"the largest real part of all {self.eigenvalues} eigenvalues is {where}{tail}"
+            largest = (
+                f"the largest real part of all {self.eigenvalues} eigenvalues is {where}{tail}"
+            )
+            if not _is_of_direct_currents(self.mode.eigenvalue, self.rated_hz):
+                return largest
+            return f"direct currents of the network die away last, no swing of machines: {largest}"
         return f"{self.growth(self.mode)}; cause: {self._why()}{tail}"
 
     def growth(self, mode: Mode) -> str:

@@ -444,7 +444,8 @@ class Linearised:
             for misfit in found
         ]
         speeds = tuple(matching(model.names, analysis.swing))
-        stability = name_common_speed(examined.stability, speeds)
+        rated_hz = rated_frequency(prepared)
+        stability = replace(name_common_speed(examined.stability, speeds), rated_hz=rated_hz)
         eigenvalues: Sequence[complex] = ()
         outside = None
         if spectrum is not None:
@@ -454,7 +455,7 @@ class Linearised:
             outside = replace(
                 hidden(spectrum.eigenvalues, low, high),
                 electromechanical=tuple(swings),
-                rated_hz=rated_frequency(prepared),
+                rated_hz=rated_hz,
             )
         fit_errors = {
             name: component.disagreement

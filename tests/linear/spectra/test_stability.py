@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import scipy.linalg
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra import stability
 from orchestrator.linear.spectra.modes import find_modes, oscillations
-from orchestrator.linear.spectra.stability import Cause, Hidden, hidden, judge
+from orchestrator.linear.spectra.stability import Cause, Hidden, Stability, hidden, judge
 
 STEP = 1e-4
 PLANTED = {0.01: 0.002, 3.0: 0.5, 37.0: 104.0, 900.0: 0.3, 4_999.0: 20.0, 7_300.0: 11.0}
@@ -221,6 +222,21 @@ def test_what_swings_with_the_rated_frequency_is_called_no_swing_of_machines(her
     assert ("direct currents of the network die away: no swing of machines" in said) == is_said
     swings = Hidden((0.1, 2.0), 7, mode, (mode,), rated_hz=rated)
     assert "direct currents" not in swings.sentence()
+
+
+@pytest.mark.parametrize(
+    ("real", "hertz", "rated", "is_said"),
+    [(-0.01, 60.03, 60.0, True), (-0.01, 1.2, 60.0, False), (-0.01, 60.0, None, False)],
+)
+def test_a_verdict_says_what_dies_away_last_before_its_figures(real, hertz, rated, is_said):
+    """A planner read "-0.0036 1/s (60 Hz; grid.load_31.i_im)" as a swing that is hardly damped."""
+    mode = SimpleNamespace(
+        eigenvalue=complex(real, 2 * np.pi * hertz), participation=(("grid.load_31.i_im", 0.49),)
+    )
+    said = Stability(True, mode, eigenvalues=621, rated_hz=rated).sentence()
+    figures = f"the largest real part of all 621 eigenvalues is -0.01 1/s ({hertz:.4g} Hz; "
+    words = "direct currents of the network die away last, no swing of machines: " * is_said
+    assert said == f"stable: {words}{figures}grid.load_31.i_im 0.49)"
 
 
 def test_electromechanical_modes_outside_of_the_range_are_named_with_a_range_that_shows_them():
