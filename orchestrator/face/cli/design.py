@@ -34,6 +34,7 @@ from orchestrator.face.cli.terminal import (
     print_questions,
     said_stages,
     warn,
+    with_announced_questions,
 )
 from orchestrator.face.cli.verdict import add_verdict_argument, exit_code, print_stability
 from orchestrator.output.results.manifest import made_now
@@ -124,7 +125,8 @@ def run(options: argparse.Namespace) -> int:
         print_json(controller.as_json(path) | {"made": made_now()})
         return ends
     console = make_console(names=design.prepared.names)
-    print_parts(console, first_screen(design, _command_with_less_gain(options, controller)))
+    first = first_screen(design, _command_with_less_gain(options, controller))
+    print_parts(console, with_announced_questions(first, [design.prepared]))
     print_stability(
         console,
         {

@@ -11,7 +11,6 @@ from rich.console import Console
 from rich.markup import escape
 
 from orchestrator.core.errors import InputError
-from orchestrator.core.question_kinds import questions_below
 from orchestrator.core.safe_files import made_folder
 from orchestrator.face.api.scenario import Scenario, modes_of
 from orchestrator.face.cli import terminal
@@ -123,7 +122,7 @@ def _compute(
         return exit_code(options, [r.stability for r in results])
     console = terminal.make_console(names=results[0].prepared.names if results else None)
     answers = [of_modes(r) for r in shown]
-    below = questions_below(question for r in results for question in r.prepared.questions)
+    below = terminal.announced_questions(r.prepared for r in results)
     beside_answers = [*_repetitions(told), *said, *below]
     print_answers(console, answers, shown, beside_answers, details=options.details)
     _warn(told)

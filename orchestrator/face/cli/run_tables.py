@@ -8,7 +8,7 @@ from rich.markup import escape
 
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.devices.fmi.loaded_component import PYTHON_BACKED
-from orchestrator.face.cli.terminal import print_named_modes, print_sources
+from orchestrator.face.cli.terminal import announced_questions, print_named_modes, print_sources
 from orchestrator.face.cli.verdict import print_answers, print_details
 from orchestrator.studies.runs import tables
 from orchestrator.studies.runs.answer import EarlyEnd
@@ -61,7 +61,8 @@ def print_run(
     faults = dict.fromkeys(fault.in_words for m in modes for fault in m.prepared.faults)
     answers = [of_run(r) for r in results]
     relays = [f"{one.subject}: {one.quiet_relays}" for one in answers if one.quiet_relays]
-    print_answers(console, answers, modes, [*beside, *faults, *relays], details=details)
+    below = announced_questions(m.prepared for m in modes)
+    print_answers(console, answers, modes, [*beside, *faults, *relays, *below], details=details)
     print_named_modes(console, modes, details=details)
     print_sources(console, modes)
     ring_downs = tables.ring_downs(results)

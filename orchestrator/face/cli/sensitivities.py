@@ -1,11 +1,13 @@
 """``gfor sensitivities``: how each parameter of each FMU moves a mode."""
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
+from rich.console import RenderableType
 from rich.markup import escape
 
 from orchestrator.core.safe_files import made_folder
@@ -19,10 +21,18 @@ from orchestrator.face.cli.arguments import (
 )
 from orchestrator.face.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.face.cli.progress_lines import both, progress_lines
-from orchestrator.face.cli.terminal import make_console, print_json, print_warnings, warn
+from orchestrator.face.cli.terminal import (
+    make_console,
+    print_json,
+    print_parts,
+    print_warnings,
+    warn,
+    with_announced_questions,
+)
 from orchestrator.face.cli.verdict import add_verdict_argument, exit_code, print_verdicts
 from orchestrator.output.results.lock import hold_folder
 from orchestrator.studies.sensitivities.request import SensitivitiesRequest
+from orchestrator.studies.sensitivities.sensitivities import SensitivityResult
 from orchestrator.studies.sensitivities.view import left_out, sensitivity_table, tell_most
 
 
@@ -68,14 +78,17 @@ def _compute(
         print_warnings(results)
         for one in found:
             warn(one.result.modes.prepared.name, one.result.warnings)
-            console.print(escape(tell_most(one.result)), "")
-            console.print(sensitivity_table(one.result), "")
-            missing = left_out(one.result)
-            if missing:
-                console.print(
-                    f"{len(missing)} of {len(one.result.rows)} parameters have no derivative", ""
-                )
+        parts = chain.from_iterable(_parts(one.result) for one in found)
+        print_parts(console, with_announced_questions(parts, [one.prepared for one in results]))
         if written:
             console.print(escape(f"Written: {', '.join(map(str, written))}"), soft_wrap=True)
     failed = int(all(row.derivative is None for one in found for row in one.result.rows))
     return failed or exit_code(options, [r.stability for r in results])
+
+
+def _parts(result: SensitivityResult) -> Iterator[RenderableType]:
+    yield from (escape(tell_most(result)), "", sensitivity_table(result), "")
+    missing = left_out(result)
+    if missing:
+        yield f"{len(missing)} of {len(result.rows)} parameters have no derivative"
+        yield ""

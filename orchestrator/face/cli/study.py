@@ -25,6 +25,7 @@ from orchestrator.face.cli.terminal import (
     print_parts,
     print_questions,
     say,
+    with_announced_questions,
 )
 from orchestrator.face.cli.verdict import add_verdict_argument
 from orchestrator.output.report.progress import progress_bar
@@ -195,7 +196,7 @@ def present(
     if options.json:
         print_json(as_json())
     else:
-        print_parts(console, parts)
+        print_parts(console, with_announced_questions(parts, prepared))
     for text in remarks:
         make_errors().print(escape(text), soft_wrap=True)
     if end and not options.json:

@@ -15,7 +15,7 @@ from rich.console import Console, RenderableType
 from rich.markup import escape
 
 from orchestrator.core.errors import Problem
-from orchestrator.core.question_kinds import by_kind
+from orchestrator.core.question_kinds import by_kind, questions_below
 from orchestrator.core.safe_files import made_folder
 from orchestrator.face.cli.known_questions import new_questions
 from orchestrator.face.cli.later import say_last
@@ -170,6 +170,27 @@ def print_questions(
     others = "other " if fresh else ""
     text = f"{known} {others}questions about {path.name} are those of an earlier command"
     _ask([f"{text}; {command} shows them, and --json has them"])
+
+
+def announced_questions(scenarios: Iterable[PreparedScenario]) -> list[str]:
+    """Return a line on the questions that stand below an answer, for its reader; none without any."""
+    return questions_below(question for prepared in scenarios for question in prepared.questions)
+
+
+def with_announced_questions(
+    parts: Iterable[RenderableType], scenarios: Iterable[PreparedScenario]
+) -> Iterator[RenderableType]:
+    """Yield the parts of an answer, with the line on the questions that stand below them all.
+
+    The line follows the sentences with which the answer begins, or the table where it begins with one: below long
+    tables nobody who has read the verdict would look for it."""
+    told = list(parts)
+    tables = [k for k, part in enumerate(told) if not isinstance(part, str)]
+    place = tables[0] if tables else len(told)
+    while place and told[place - 1] == "":
+        place -= 1  # above the empty line that ends the sentences
+    place = place or 1
+    yield from (*told[:place], *map(escape, announced_questions(scenarios)), *told[place:])
 
 
 def ask(questions: Iterable[Problem]) -> None:

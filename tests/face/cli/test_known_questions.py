@@ -5,10 +5,13 @@ import json
 import re
 import shlex
 from contextlib import redirect_stderr, redirect_stdout
+from types import SimpleNamespace
 
 import pytest
 
+from orchestrator.core.errors import Problem
 from orchestrator.face.cli import main
+from orchestrator.face.cli.terminal import with_announced_questions
 from tests.cases.networks.psse.test_questions import CASE, DYR, RAW
 
 
@@ -68,3 +71,40 @@ def test_questions_are_said_where_no_answer_comes(case):
     questions, _, error = screen.getvalue().rpartition("error: ")
     assert "question: " in questions
     assert "nowhere" in error
+
+
+COMMANDS = (
+    ("modes",),
+    ("run", "--stop", "0.05"),
+    ("sweep", "--vary", "sg1.machine.H=6:7:2"),
+    ("screen", "--outages", "line_5_6", "--workers", "1"),
+    ("sensitivities", "--parameter", "sg1.machine.H"),
+)
+
+
+@pytest.mark.parametrize("words", COMMANDS, ids=lambda words: words[0])
+def test_questions_are_announced_above_the_tables_that_they_stand_below(
+    words, gfor, case, tmp_path
+):
+    command, *options = words
+    out = ("--out", tmp_path / "results")
+    screen, err = asked(gfor, command, case, *options, *out)
+    lines = screen.splitlines()
+    (place,) = [k for k, line in enumerate(lines) if re.match(r"\d questions? below: ", line)]
+    assert lines[place].startswith(f"{len(err)} questions below: ")
+    tables = [k for k, line in enumerate(lines) if line.startswith("┏")]
+    assert place < tables[-1]
+    assert len([k for k in tables if k < place]) <= 1
+
+
+def printed(parts, questions):
+    scenario = SimpleNamespace(questions=[Problem("a.csv, line 3", "is it?")] * questions)
+    return list(with_announced_questions(parts, [scenario]))
+
+
+def test_the_line_follows_what_the_answer_begins_with():
+    table, line = object(), "1 question below: a.csv, line 3"
+    assert printed(["stable", "", table, "end"], 1) == ["stable", line, "", table, "end"]
+    assert printed([table, "", table], 1) == [table, line, "", table]
+    assert printed(["stable", "of it"], 1) == ["stable", "of it", line]
+    assert printed(["stable", "", table, ""], 0) == ["stable", "", table, ""]
