@@ -22,7 +22,14 @@ from orchestrator.core.spelling import as_options
 from orchestrator.face.cli import main
 from tests.support import once
 from tests.support.bytecode import TESTS, import_share, keep
-from tests.support.durations import MEASURED, Measure, longest_first, mark
+from tests.support.durations import (
+    MEASURED,
+    Measure,
+    longest_first,
+    mark,
+    may_be_chosen,
+    require_readable,
+)
 from tests.support.reports import FewReports, asks_for_seconds
 from tests.support.skips import Skips, in_ci
 from tests.support.undrawn import write_empty
@@ -60,12 +67,21 @@ def pytest_collection(session):
     """The workers of a whole run share the work of compiling the tests."""
     worker = getattr(session.config, "workerinput", None)
     if worker and [Path(name).resolve() for name in session.config.args] == [TESTS]:
-        import_share(int(worker["workerid"].removeprefix("gw")), worker["workercount"])
+        number = int(worker["workerid"].removeprefix("gw"))
+        chosen = session.config.option.markexpr
+        import_share(number, worker["workercount"], lambda path: may_be_chosen(path, chosen))
+
+
+def pytest_ignore_collect(collection_path, config):
+    if collection_path.match("test_*.py") and collection_path.is_relative_to(TESTS):
+        return None if may_be_chosen(collection_path, config.option.markexpr) else True
+    return None  # others decide
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection_modifyitems(items):
     mark(items)
+    require_readable(items)
     yield  # -m chooses by the marks
     longest_first(items)
 

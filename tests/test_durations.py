@@ -3,7 +3,19 @@
 import pytest
 
 from tests.benchmarks.durations import catches
-from tests.support.durations import LIST, LONGEST, NIGHTLY, Measure, longest_first, mark, read_list
+from tests.support.durations import (
+    LIST,
+    LONGEST,
+    NIGHTLY,
+    ROOT,
+    Measure,
+    longest_first,
+    mark,
+    may_be_chosen,
+    may_hold_slow_tests,
+    read_list,
+    require_readable,
+)
 
 
 class Item:
@@ -32,6 +44,39 @@ def test_the_longest_file_comes_first_where_all_are_slow():
     items = [Item(short), Item(long, "slow")]
     longest_first(items)
     assert [item.nodeid for item in items] == [short, long]
+
+
+@pytest.mark.parametrize(
+    ("expression", "all_are_read"),
+    [
+        ("slow", False),
+        ("slow and not nightly and not wheel", False),
+        ("nightly", False),
+        ("not slow", True),
+        ("slow or reproduction", True),
+        ("slow and not nightly or reproduction", True),
+        ("slow and (not nightly or reproduction)", True),
+        ("reproduction", True),
+        ("", True),
+    ],
+)
+def test_files_without_slow_tests_are_read_unless_those_alone_are_asked_for(
+    expression, all_are_read
+):
+    files = {path for path in ROOT.glob("tests/**/test_*.py") if may_be_chosen(path, expression)}
+    listed = {ROOT / test.partition("::")[0] for test in read_list()}
+    assert listed <= files
+    assert (set(ROOT.glob("tests/**/test_*.py")) == files) == all_are_read
+
+
+def test_a_test_that_is_slow_by_a_mark_from_elsewhere_is_told(tmp_path):
+    quick = next(p for p in sorted(ROOT.glob("tests/**/test_*.py")) if not may_hold_slow_tests(p))
+    item = Item("tests/a.py::test", "slow")
+    item.path = quick
+    with pytest.raises(pytest.UsageError, match=r"write pytest\.mark\.slow in this file"):
+        require_readable([item])
+    item.path = ROOT / next(iter(read_list())).partition("::")[0]
+    require_readable([item])
 
 
 def test_the_list_names_tests_of_files_that_are_there_each_once():

@@ -6,6 +6,7 @@ would compile the packages anew, and each worker all the tests.
 
 import os
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
@@ -24,12 +25,12 @@ def keep() -> None:
     sys.dont_write_bytecode = False
 
 
-def import_share(worker: int, workers: int) -> None:
-    """Import every so manieth file of tests before pytest imports all of them.
+def import_share(worker: int, workers: int, is_read: Callable[[Path], bool]) -> None:
+    """Import every so manieth file of tests that pytest reads before it imports all of them.
 
     The workers of xdist import the same files in the same order, so in a fresh checkout each would compile each file.
     An error is left for pytest to meet and to report.
     """
-    for path in sorted(TESTS.rglob("test_*.py"))[worker::workers]:
+    for path in sorted(filter(is_read, TESTS.rglob("test_*.py")))[worker::workers]:
         with suppress(Exception, pytest.skip.Exception):
             import_module(".".join(path.relative_to(TESTS.parent).with_suffix("").parts))

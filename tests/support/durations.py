@@ -5,16 +5,20 @@ is not on the list, for example a new one, counts as quick.
 """
 
 import os
+import re
 from collections import Counter
-from collections.abc import Generator
+from collections.abc import Generator, Iterable
+from functools import cache
 from pathlib import Path
 
 import pytest
 
-LIST = Path(__file__).parents[1] / "slow_tests.txt"
+ROOT = Path(__file__).parents[2]
+
+LIST = ROOT / "tests" / "slow_tests.txt"
 """A line is ``SECONDS TEST``: seconds of processor, and what pytest calls the test."""
 
-NIGHTLY = Path(__file__).parents[1] / "nightly_tests.txt"
+NIGHTLY = ROOT / "tests" / "nightly_tests.txt"
 """How the names begin of tests that `.ci/nightly` runs: other published systems, long searches, and the second and
 third of rows that differ in a setting. The paper's tables are not among them.
 """
@@ -46,6 +50,44 @@ def mark(items: list[pytest.Item]) -> None:
             item.add_marker("slow")
         if item.nodeid in listed and not item.get_closest_marker("quick"):
             item.add_marker("slow")
+
+
+_OF_SLOW_TESTS = ("slow", "nightly", "wheel")
+"""Marks that no quick test has."""
+
+_SLOW_IN_ITSELF = re.compile(rf"\bmark\.({'|'.join(_OF_SLOW_TESTS)})\b")
+
+
+@cache
+def _files() -> frozenset[str]:
+    names = (*read_list(), *NIGHTLY.read_text(encoding="utf-8").split("\n")[:-1])
+    return frozenset(_file_of(name) for name in names)
+
+
+def may_hold_slow_tests(path: Path) -> bool:
+    """Say whether a file of tests is named in a list, or marks a test in its own text."""
+    return path.relative_to(ROOT).as_posix() in _files() or bool(
+        _SLOW_IN_ITSELF.search(path.read_text(encoding="utf-8"))
+    )
+
+
+def may_be_chosen(path: Path, expression: str) -> bool:
+    """Say whether a file of tests may have one that ``-m`` chooses.
+
+    Where it chooses slow tests alone, as ``slow and not nightly`` does, half of the files need not be read, which is
+    11 s of processor for each worker."""
+    alone = re.fullmatch(rf"({'|'.join(_OF_SLOW_TESTS)})( and (not )?\w+)*", expression.strip())
+    return not alone or may_hold_slow_tests(path)
+
+
+def require_readable(items: Iterable[pytest.Item]) -> None:
+    """Raise if a test is slow without a list or its own file to say so: `may_be_chosen` would leave it out."""
+    slow = {item.path for item in items if any(map(item.get_closest_marker, _OF_SLOW_TESTS))}
+    for path in slow:
+        if not may_hold_slow_tests(path):
+            raise pytest.UsageError(
+                f"{path}: a test is slow by a mark from elsewhere; write pytest.mark.slow in this file"
+            )
 
 
 def longest_first(items: list[pytest.Item]) -> None:
