@@ -1,5 +1,7 @@
 """The verbs, offered over the Model Context Protocol with the official library."""
 
+import asyncio
+import time
 from collections.abc import Callable
 from functools import wraps
 from importlib.metadata import version
@@ -18,6 +20,7 @@ from orchestrator.face.agents.streams import Incoming, Open, Outgoing
 from orchestrator.face.agents.verbs import VERBS, Verbs
 
 _TIMES = 2.0  # a question may wait as long for its turn as it may take
+_TOLD_EVERY = 5.0  # [s] after which a client hears again that its question is worked on
 _SHOWN = 40  # characters of an unknown argument's name that an error repeats
 
 _P = ParamSpec("_P")
@@ -41,7 +44,7 @@ def make_server(allowance: Allowance) -> MCPServer[Any]:
     server = VerbServer(
         "gfor-cosim", instructions=_INSTRUCTIONS, version=version("gfor-cosim"), log_level="WARNING"
     )
-    server.patience = _TIMES * allowance.seconds
+    server.seconds, server.patience = allowance.seconds, _TIMES * allowance.seconds
     verbs = Verbs(allowance)
     reading = ToolAnnotations(read_only_hint=True, open_world_hint=False)
     for name in VERBS:
@@ -54,8 +57,10 @@ def make_server(allowance: Allowance) -> MCPServer[Any]:
 class VerbServer(MCPServer[Any]):
     """A server that refuses an argument which a verb has not, instead of an answer as if it were not given.
 
-    Once its input has ended, it answers what was asked until then, within ``patience`` [s]."""
+    Once its input has ended, it answers what was asked until then, within ``patience`` [s]. A question takes at most
+    ``seconds`` [s]; a client that asks for it hears meanwhile that it is worked on."""
 
+    seconds = 0.0
     patience = 0.0
 
     async def run_stdio_async(self) -> None:
@@ -83,12 +88,26 @@ class VerbServer(MCPServer[Any]):
                 f"{name[:_SHOWN]}: there is no such verb; there are: {', '.join(VERBS)}"
             )
         _check_names(name, arguments, schemas[name])
+        telling = asyncio.create_task(self._tell_progress(name, context))
         try:
             return await super().call_tool(name, arguments, context)
         except UnexpectedToolError:
             raise
         except ToolError as error:
             raise ToolError(f"{name}: {_reason(error)}") from error.__cause__
+        finally:
+            telling.cancel()
+
+    async def _tell_progress(self, verb: str, context: Context[Any, Any] | None) -> None:
+        """Tell again and again for how long a question has been worked on, until it is answered."""
+        begin = time.monotonic()
+        while context is not None:
+            await asyncio.sleep(_TOLD_EVERY)
+            since = time.monotonic() - begin
+            limit = f"it may take {self.seconds:g} s, and wait as long for its turn"
+            await context.report_progress(
+                since, None, f"{verb}: at work for {since:.0f} s; {limit}"
+            )
 
 
 def _check_names(verb: str, given: dict[str, Any], schema: dict[str, Any]) -> None:

@@ -3,13 +3,14 @@
 import json
 import subprocess
 import sys
+import threading
 
 import anyio
 import jsonschema
 import pytest
 
 import orchestrator as gfor
-from orchestrator.face.agents.question import Allowance
+from orchestrator.face.agents.question import Allowance, NoAnswerError
 from tests.support.late import LateLibrary
 
 mcp, streams = LateLibrary("mcp"), LateLibrary("mcp.client.stdio")
@@ -98,6 +99,49 @@ def test_the_end_of_the_input_leaves_no_question_unanswered(tmp_path):
     assert errors == [-32700, -32600]
     assert "scenario" in str(next(one for one in answers if one["id"] == 3))
     assert [*tmp_path.iterdir()] == []
+
+
+def test_a_long_question_tells_its_progress_and_others_are_answered_meanwhile(
+    tmp_path, monkeypatch
+):
+    """Minutes without a word, as with a network of many thousand buses, looked like a server that hangs."""
+    may_end = threading.Event()
+
+    def asked(words, _):
+        assert may_end.wait(60)
+        raise NoAnswerError(f"gfor {words[0]}: no answer within 7 s")
+
+    monkeypatch.setattr("orchestrator.face.agents.verbs.ask", asked)
+    monkeypatch.setattr("orchestrator.face.agents.server._TOLD_EVERY", 0.02)
+    told, found = [], {}
+
+    async def talk():
+        heard = anyio.Event()
+
+        async def progress(seconds, total, text):
+            told.append((seconds, text))
+            heard.set()
+
+        async with mcp.Client(owner.make_server(Allowance((tmp_path,), tmp_path, 7.0))) as client:
+
+            async def long():
+                given = {"case": "two_area", "scenario": "base"}
+                found["long"] = await client.call_tool("modes", given, progress_callback=progress)
+
+            async with anyio.create_task_group() as group:
+                group.start_soon(long)
+                await heard.wait()
+                found["short"] = await client.call_tool("cases", {})
+                assert "long" not in found
+                may_end.set()
+
+    anyio.run(talk)
+    assert not found["short"].is_error
+    assert found["long"].is_error
+    assert "no answer within 7 s" in found["long"].content[0].text
+    seconds, text = told[0]
+    assert 0 < seconds < 60
+    assert text == "modes: at work for 0 s; it may take 7 s, and wait as long for its turn"
 
 
 def test_every_verb_only_reads_and_has_a_schema_with_units(answers):
