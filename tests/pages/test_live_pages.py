@@ -212,6 +212,38 @@ def test_two_lines_side_by_side_have_their_number_at_their_flow(window):
     assert odd == ["2 lines: 200 MW"]
 
 
+MARKS = """
+Array.from(document.querySelectorAll("#network circle.unit, #network path.load"), x => {
+  const {left, top, right, bottom} = x.getBoundingClientRect();
+  return [left, top, right, bottom];
+})
+"""
+TEXTS = """
+Array.from(document.querySelectorAll("#names text"), x => {
+  const {left, top, right, bottom} = x.getBoundingClientRect();
+  return [x.textContent, [left, top + 2, right, bottom - 2]];
+})
+"""
+"""Words of the single-line diagram with their places, without what letters leave free above and below."""
+
+
+def test_no_word_of_the_network_touches_a_mark(window):
+    """ "825 MW" began in the circles of its transformer."""
+    view = window(viewport={"width": 1280, "height": 900})
+    view.goto((ROOT / ".docs" / "live" / "ieee39.html").as_uri())
+    view.locator("#names text").first.wait_for(state="attached")
+    texts, marks = view.evaluate(TEXTS), view.evaluate(MARKS)
+    assert len(marks) > 40
+    assert "825 MW" in [text for text, _ in texts]
+    touching = [
+        text
+        for text, (x0, y0, x1, y1) in texts
+        for (left, top, right, bottom) in marks
+        if x0 < right and left < x1 and y0 < bottom and top < y1
+    ]
+    assert touching == []
+
+
 def test_a_slider_tells_where_its_step_leaves_another_mode_least_damped(window):
     """Its points are those of the mode shown: where that one is damped more, another one may become the worst."""
     path = ROOT / ".docs" / "live" / "ieee39.html"

@@ -54,6 +54,7 @@ function hideTip() { $("tip").hidden = true; }
 
 // Texts beside their points, each where it covers nothing that came before it; what finds no place is left out.
 const FEW_POINTS = 150;  // up to which each text is compared with all points: beyond, a picture would wait for it
+const widthOf = text => 0.6 * text.length + 0.35 * (text.match(/[MW]/g) ?? []).length;  // in parts of its size
 function placedTexts(labels, taken, size, inside = { x0: -Infinity, y0: -Infinity, x1: Infinity, y1: Infinity }) {
   const boxes = [...taken], texts = [];
   const free = b => b.x0 >= inside.x0 && b.x1 <= inside.x1 && b.y0 >= inside.y0 && b.y1 <= inside.y1 && !boxes.some(o => o.x0 < b.x1 && b.x0 < o.x1 && o.y0 < b.y1 && b.y0 < o.y1);
@@ -66,7 +67,7 @@ function placedTexts(labels, taken, size, inside = { x0: -Infinity, y0: -Infinit
   };
   for (const { x, y, r, words, look, first } of labels) {
     const spots = words.flatMap(text => [...(first ? [first] : []), ...ways].map(([dx, dy]) => {
-      const w = 0.6 * size * text.length, x0 = x + dx * r - (dx > 0.3 ? 0 : dx < -0.3 ? w : w / 2), y0 = y + dy * (r + size / 2) - size / 2;
+      const w = size * widthOf(text), x0 = x + dx * r - (dx > 0.3 ? 0 : dx < -0.3 ? w : w / 2), y0 = y + dy * (r + size / 2) - size / 2;
       return { text, x0, y0, x1: x0 + w, y1: y0 + size };
     }));
     const at = spots.find(b => free(b) && isOwn(b, x, y)) ?? spots.find(free);

@@ -2,6 +2,7 @@
 // The single-line diagram: buses where the layout put them, elements that are set by a click.
 const lens = { x: 0, y: 0, w: 0, h: 0 };
 let element = null;  // kind and name of what was clicked
+const MARK = 8;  // from the middle of a transformer's two circles to their end
 
 function fitNetwork() {
   const d = seen.info?.diagram;
@@ -44,7 +45,7 @@ function things(kind, name, label, ...children) {
 function flowLabel(lines) {
   const [first] = lines, count = lines.length, sum = Math.abs(lines.reduce((all, one) => all + one.p, 0)), mean = key => lines.reduce((all, one) => all + one[key], 0) / count;
   const alike = lines.every(one => fixed(one.p, 0) === fixed(first.p, 0)), several = alike ? `${count} × ${fixed(Math.abs(first.p), 0)} MW` : `${count} lines: ${fixed(sum, 0)} MW`;
-  return { x: mean("x"), y: mean("y"), r: 6, look: "flow", words: [count > 1 ? several : `${fixed(sum, 0)} MW`], size: sum };
+  return { x: mean("x"), y: mean("y"), r: lines.some(one => one.marked) ? MARK + 2 : 6, look: "flow", words: [count > 1 ? several : `${fixed(sum, 0)} MW`], size: sum };
 }
 function paintNetwork() {
   if (state.tab !== "network") return;
@@ -70,11 +71,13 @@ function paintNetwork() {
     const wire = draw("path", { class: `wire${closed ? "" : " open"}`, d: path });
     if (p !== null && closed) wire.style.strokeWidth = (1.2 + 4 * Math.abs(p) / most).toFixed(2);
     const group = things("line", line.name, label, draw("path", { class: "hit", d: path }), wire);
-    if (line.kind === "branch") for (const s of [-1, 1]) group.append(draw("circle", { class: "unit", cx: mx + s * 3 * (b.x - a.x) / length, cy: my + s * 3 * (b.y - a.y) / length, r: 4.5, "fill-opacity": 0 }));
+    const marked = line.kind === "branch";  // two circles of a transformer, which no word may touch
+    if (marked) keepFree(mx, my, MARK);
+    if (marked) for (const s of [-1, 1]) group.append(draw("circle", { class: "unit", cx: mx + s * 3 * (b.x - a.x) / length, cy: my + s * 3 * (b.y - a.y) / length, r: 4.5, "fill-opacity": 0 }));
     if (p !== null && closed) {
       const way = p >= 0 ? 1 : -1, ux = way * (b.x - a.x) / length, uy = way * (b.y - a.y) / length;
       group.append(draw("path", { class: "wire", d: arrow(mx - 5 * ux, my - 5 * uy, mx + 6 * ux, my + 6 * uy) }));
-      (beside[key] ??= []).push({ x: (mx + (a.x + b.x) / 2) / 2, y: (my + (a.y + b.y) / 2) / 2, p: line.from < line.to ? p : -p });
+      (beside[key] ??= []).push({ x: (mx + (a.x + b.x) / 2) / 2, y: (my + (a.y + b.y) / 2) / 2, p: line.from < line.to ? p : -p, marked });
     }
     parts.push(group);
   }
@@ -96,7 +99,7 @@ function paintNetwork() {
       const label = `unit ${thing.title} at ${name}: ${on ? (m ? `${fixed(m.p_mw, 1)} MW, ${fixed(m.q_mvar, 1)} Mvar, ${fixed(m.loading_percent, 0)} % of ${fixed(m.rating_mva, 0)} MVA` : "in service") : "out of service"}`;
       parts.push(things(kind, thing.name, label, stub, thing.machine ? draw("circle", { class: `unit${on ? "" : " out"}`, cx: p.x, cy: p.y, r: 10 }) : draw("rect", { class: `unit${on ? "" : " out"}`, x: p.x - 9, y: p.y - 9, width: 18, height: 18 }), draw("path", { class: "wire", d: `M${p.x - 5} ${p.y}q2.5 -6 5 0t5 0` })));
     } else {
-      keepFree(p.x, p.y, 6);
+      keepFree(p.x, p.y, 8);
       const scale = thing.scale ? state.values[thing.scale] ?? 1 : 1;
       const label = `load ${thing.title} at ${name}: ${fixed(thing.p_mw * scale, 1)} MW${scale !== 1 ? `, ${number(scale)} times the case's` : ""}`;
       parts.push(things(kind, thing.name, label, stub, draw("path", { class: "load", d: `M${p.x - 6} ${p.y - 4}H${p.x + 6}L${p.x} ${p.y + 7}z` })));
