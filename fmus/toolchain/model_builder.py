@@ -318,13 +318,17 @@ class ModelBuilder:
         tunable = [s for v, s in self._declared.values() if isinstance(v, Parameter) and v.tunable]
         values: list[Expr] = []
         for index, variable in enumerate(calculated):
-            (value,) = substitute([self._expressions[variable.name]], c[:index], values)
-            if depends_on([value], tunable):
-                raise ValueError(
-                    f"model {self.name}: {variable.name!r} is computed once, at initialisation, "
-                    "and must not depend on a tunable parameter"
-                )
-            values.append(value)
+            values += substitute([self._expressions[variable.name]], c[:index], values)
+        if depends_on(values, tunable):
+            first = next(
+                variable.name
+                for variable, value in zip(calculated, values, strict=True)
+                if depends_on([value], tunable)
+            )
+            raise ValueError(
+                f"model {self.name}: {first!r} is computed once, at initialisation, "
+                "and must not depend on a tunable parameter"
+            )
         return values
 
     def _closed_signals(self) -> list[tuple[Expr, Expr]]:
@@ -359,13 +363,17 @@ class ModelBuilder:
         allowed = {s.name() for s in p} | {
             v.name for v, _ in self._declared.values() if isinstance(v, CalculatedParameter)
         }
-        for variable, _ in self._declared.values():
-            if isinstance(variable, CalculatedParameter | State):
-                others = {
-                    s.name() for s in symbols_in([self._expressions[variable.name]])
-                } - allowed
-                if others:
-                    raise ValueError(
-                        f"model {self.name}: {variable.name!r} must follow from parameters at initialisation, "
-                        f"but depends on {', '.join(sorted(others))}"
-                    )
+        given = {
+            v.name: self._expressions[v.name]
+            for v, _ in self._declared.values()
+            if isinstance(v, CalculatedParameter | State)
+        }
+        if {s.name() for s in symbols_in([*given.values()])} <= allowed:
+            return
+        for name, value in given.items():
+            others = {s.name() for s in symbols_in([value])} - allowed
+            if others:
+                raise ValueError(
+                    f"model {self.name}: {name!r} must follow from parameters at initialisation, "
+                    f"but depends on {', '.join(sorted(others))}"
+                )

@@ -9,6 +9,8 @@ from numbers import Real
 
 from fmus.toolchain.symbols.operations import VALUE, Op
 
+_CONST, _new = Op.CONST, object.__new__  # looked up for every node
+
 RULES: dict[int, Callable[[Expr, Expr], Expr]] = {}
 """What makes an operation where it is not just written down; `rules` fills it."""
 
@@ -76,9 +78,9 @@ Scalar = Expr | float  # an operand of equations
 
 def node(op: int, a: Expr, b: Expr) -> Expr:
     """An operation as it stands; one on constants is a constant."""
-    if a.op == Op.CONST and b.op == Op.CONST:
+    if a.op == _CONST == b.op:
         return constant(VALUE[op](a.value, b.value))
-    made = object.__new__(Expr)
+    made = _new(Expr)
     made.op, made.a, made.b = op, a, b
     return made
 

@@ -17,6 +17,7 @@ Values = list[list[float]]
 OFTEN = 20
 """Calls of a function after which it is compiled to Python: that takes as long as a dozen evaluations of it."""
 
+_CONST, _SYMBOL = Op.CONST, Op.SYMBOL  # looked up for every node
 _LONGEST = 20_000  # instructions of a function that is compiled; Python takes long for more
 
 _KNOWN: dict[str, Any] = {**NAMES, "atan": math.atan, "inf": math.inf, "nan": math.nan}
@@ -43,7 +44,7 @@ class Function:
         self.nodes, self._ends = sorted_nodes(
             [value for vector in self.outputs for value in vector]
         )
-        for node in {node for node in self.nodes if node.op == Op.SYMBOL}.difference(*self.inputs):
+        for node in {node for node in self.nodes if node.op == _SYMBOL}.difference(*self.inputs):
             raise ValueError(f"{self.name}: {node.label!r} is none of its arguments")
         self._calls = 0
 
@@ -71,7 +72,7 @@ class Function:
         for root, _, _ in roots:
             uses[root] += 1
         for node in self.nodes:
-            if node.op < Op.CONST:
+            if node.op < _CONST:
                 uses[node.a] += 1
                 uses[node.b] += node.op not in UNARY
         place: dict[Expr, int] = {}
@@ -89,10 +90,10 @@ class Function:
                 op, a, b, value = node.op, 0, 0, 0.0
                 if op in UNARY:
                     a = b = used(node.a)
-                elif op < Op.CONST:
+                elif op < _CONST:
                     b = used(node.b)
                     a = used(node.a)
-                elif op == Op.CONST:
+                elif op == _CONST:
                     value = node.value
                 else:
                     op, (a, b) = Op.INPUT, given[node]
@@ -183,21 +184,24 @@ def sorted_nodes(roots: Iterable[Expr]) -> tuple[list[Expr], list[int]]:
     nodes: list[Expr] = []
     ends: list[int] = []
     known = set[Expr]()
+    add, write = known.add, nodes.append
     for root in roots:
         stack = [root]
+        pop = stack.pop
         while stack:
-            top = stack[-1]
-            if top not in known:
-                if top.op < Op.CONST:
-                    if top.a not in known:
-                        stack.append(top.a)
-                        continue
-                    if top.b not in known:
-                        stack.append(top.b)
-                        continue
-                known.add(top)
-                nodes.append(top)
-            stack.pop()
+            top = pop()
+            if top in known:
+                continue
+            if top.op < _CONST:
+                a, b = top.a, top.b
+                if a not in known:
+                    stack += (top, a) if b in known else (top, b, a)
+                    continue
+                if b not in known:
+                    stack += (top, b)
+                    continue
+            add(top)
+            write(top)
         ends.append(len(nodes))
     return nodes, ends
 
@@ -205,7 +209,7 @@ def sorted_nodes(roots: Iterable[Expr]) -> tuple[list[Expr], list[int]]:
 def _rewrite(nodes: Iterable[Expr], new: dict[Expr, Expr]) -> None:
     """Add what follows for each node to what is given for some symbols; nodes of no such symbol stay."""
     for node in nodes:
-        if node.op < Op.CONST:
+        if node.op < _CONST:
             a, b = new[node.a], new[node.b]
             new[node] = node if a is node.a and b is node.b else operation(node.op, a, b)
         else:
@@ -220,7 +224,7 @@ def substitute(values: Vector, old: Vector, new: Sequence[Scalar]) -> list[Expr]
 
 
 def symbols_in(values: Vector) -> list[Expr]:
-    return [node for node in sorted_nodes(values)[0] if node.op == Op.SYMBOL]
+    return [node for node in sorted_nodes(values)[0] if node.op == _SYMBOL]
 
 
 def depends_on(values: Vector, on: Vector) -> bool:
