@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fmus.toolchain.compiler import compile_here
 from orchestrator.core.arrays import Numbers
@@ -291,6 +292,63 @@ def drive(
     return outputs
 
 
+MOST_BESIDE = 8
+"""Components that `drive_beside` steps side by side at most, as drive.c has them."""
+
+
+def drive_beside(
+    components: Sequence[Component],
+    names: tuple[Sequence[str], Sequence[str]],
+    inputs: Sequence[Numbers],
+    step_size: float,
+    index: int = 0,
+    late: Sequence[Numbers] | None = None,
+) -> list[Numbers | None]:
+    """Outputs of components of one library that step side by side, each with as many rows of its own, as `drive` has.
+
+    None for one that refuses a call or has an output that is no finite number: alone it says why."""
+    count = len(inputs[0])
+    outputs = [np.empty((count, len(names[1]))) for _ in components]
+    refused = np.zeros(len(components), dtype=np.int32)
+    for first in range(0, count, STEPS_AT_ONCE):
+        part = slice(first, min(first + STEPS_AT_ONCE, count))
+        rows = [
+            StepRows(
+                component,
+                names,
+                np.ascontiguousarray(inputs[k][part]),
+                outputs[k][part],
+                None if late is None else np.ascontiguousarray(late[k][part]),
+            )
+            for k, component in enumerate(components)
+        ]
+        _make_beside(components, rows, step_size, index + first, refused)
+    return [
+        None if status or not np.isfinite(own).all() else own
+        for status, own in zip(refused, outputs, strict=True)
+    ]
+
+
+def _make_beside(
+    components: Sequence[Component],
+    rows: Sequence[StepRows],
+    step_size: float,
+    index: int,
+    refused: NDArray[np.int32],
+) -> None:
+    asked = (Steps * len(rows))(*(one.at(index, step_size) for one in rows))
+    pointers = np.array([one.pointer for one in components], dtype=np.uint64)
+    first = components[0]
+    functions = [
+        ctypes.cast(one, ctypes.c_void_p)
+        for one in (first.set_real, first.get_real, first.step_stack)
+    ]
+    with calls:
+        _library().drive_beside(
+            pointers.ctypes.data, *functions, ctypes.byref(asked), len(rows), refused.ctypes.data
+        )
+
+
 class Turning(ctypes.Structure):
     """The arguments of ``drive_turning`` in drive.c, and where it stands."""
 
@@ -413,5 +471,7 @@ def _library() -> Any:
     except (OSError, RuntimeError) as error:
         raise InputError(f"the test bench is compiled, and {error}") from error
     library.drive.argtypes = [ctypes.c_void_p] * 6
+    library.drive_beside.argtypes = [*[ctypes.c_void_p] * 5, ctypes.c_int64, ctypes.c_void_p]
+    library.drive_beside.restype = None
     library.drive_turning.argtypes = [ctypes.c_void_p] * 7
     return library

@@ -26,6 +26,58 @@ EXPORT int drive(void *component, get_set set_real, get_set get_real, do_step st
     return 0;
 }
 
+/* `gfor_step_stack` of an FMU's library. */
+typedef int (*step_stack)(void **, size_t, double, double, int *);
+
+enum { MOST_BESIDE = 8 };
+
+/* Those of some components that go on side by side: what each is called with, and its place among all. */
+struct beside {
+    void *component[MOST_BESIDE];
+    int64_t place[MOST_BESIDE], count;
+    int status[MOST_BESIDE];
+};
+
+/* Leave out those that refused a call, and note it in their place. */
+static void leave_out(struct beside *b, int *refused) {
+    int64_t kept = 0;
+    for (int64_t i = 0; i < b->count; ++i) {
+        if (b->status[i] > 1) {
+            refused[b->place[i]] = b->status[i];
+            continue;
+        }
+        b->component[kept] = b->component[i], b->place[kept++] = b->place[i];
+    }
+    b->count = kept;
+}
+
+/* As `drive`, several components of one library that step side by side, with steps that differ in their rows alone.
+   refused: 0 for each, or the status with which it refused a call and made no more steps; one that has it makes none. */
+EXPORT void drive_beside(void **components, get_set set_real, get_set get_real, step_stack step,
+                         const struct steps *asked, int64_t n, int *refused) {
+    struct beside b = {.count = 0};
+    for (int64_t i = 0; i < n && i < MOST_BESIDE; ++i)
+        if (!refused[i]) b.component[b.count] = components[i], b.place[b.count++] = i;
+    const size_t n_in = (size_t)asked->n_in, n_out = (size_t)asked->n_out;
+    for (int64_t k = 0; k < asked->count && b.count; ++k) {
+        for (int64_t i = 0; i < b.count; ++i) {
+            const struct steps *own = asked + b.place[i];
+            b.status[i] = set_real(b.component[i], own->input_references, n_in, (double *)own->inputs + k * own->n_in);
+        }
+        leave_out(&b, refused);
+        step(b.component, (size_t)b.count, (double)(asked->index + k) * asked->step_size, asked->step_size, b.status);
+        leave_out(&b, refused);
+        for (int64_t i = 0; i < b.count; ++i) {
+            const struct steps *own = asked + b.place[i];
+            double *late = (double *)own->late;
+            b.status[i] = late ? set_real(b.component[i], own->input_references, n_in, late + k * own->n_in) : 0;
+            if (b.status[i] > 1) continue;
+            b.status[i] = get_real(b.component[i], own->output_references, n_out, own->outputs + k * own->n_out);
+        }
+        leave_out(&b, refused);
+    }
+}
+
 /* A run whose voltage turns with the component's current; `held_in_step.py` says why. Complex numbers are pairs. */
 struct turning {
     const double *voltage, *late; /* for each step: that which is held, and that at which the outputs are read [pu] */

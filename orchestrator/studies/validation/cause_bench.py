@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.devices.fmi.description import VariableInfo
 from orchestrator.studies.validation.causes import CauseKind, Explanation, leaves_much
-from orchestrator.studies.validation.device import PlayedDevice
+from orchestrator.studies.validation.device import Play, PlayedDevice
 from orchestrator.studies.validation.event import RecordedEvent, noise_before
 from orchestrator.studies.validation.hidden import HiddenPart, hidden_voltages, with_hidden
 from orchestrator.studies.validation.parameters import NEVER
@@ -56,13 +56,17 @@ class CauseBench:
     def _hidden_part(self) -> HiddenPart:
         """How the errors move with the voltage that no sample holds, one run for each unknown."""
         unknown = hidden_voltages(self.events)
-        columns = []
+        plays = []
         for one in unknown:
-            self.report("looking between the samples")
             event = self.events[one.event]
             moved = with_hidden(event.recording, [one], {one.name: one.scale})
+            plays.append(Play(self.device, moved, event.start))
+        self.device.announce(plays)
+        columns = []
+        for one, play in zip(unknown, plays, strict=True):
+            self.report("looking between the samples")
             responses = list(self.base)
-            responses[one.event] = self.device.play(moved, event.start).power
+            responses[one.event] = self.device.play(play.recording, play.start).power
             columns.append((self._plain(responses) - self._plain(self.base)) / one.scale)
         size = np.sqrt(sum(int(one.recording.good.sum()) for one in self.events))
         scatter = max(self.noise / np.sqrt(2), LEAST_SCATTER) / size
@@ -76,6 +80,14 @@ class CauseBench:
     def is_kind(self, name: str) -> bool:
         """Return whether a parameter is a position and no number."""
         return self.device.description.variables[name].type != "Real"
+
+    def announce(self, each: Iterable[Values]) -> None:
+        """Tell with which values responses will be asked for, one after the other: they may be made side by side."""
+        devices = [self.device.with_values(values) for values in each]
+        plays = [
+            Play(device, one.recording, one.start) for device in devices for one in self.events
+        ]
+        self.device.announce(plays)
 
     def responses(self, values: Values) -> Responses | None:
         """The device's answers with other values; None where it does not run with them."""

@@ -36,7 +36,9 @@ def limits_of_current(bench: CauseBench) -> Iterator[Explanation]:
     left = bench.errors(capped(bench.base, voltages, limit))
     yield bench.explanation(CauseKind.LIMIT, "limit of the current", None, limit, left, unit="pu")
     tried: list[tuple[float, VariableInfo, Values]] = []
-    for info, values in itertools.islice(_limiters(bench, limit), _MOST_LIMITS):
+    limiters = list(itertools.islice(_limiters(bench, limit), _MOST_LIMITS))
+    bench.announce(values for _, values in limiters)
+    for info, values in limiters:
         said = " with ".join(f"{name} = {value:.4g}" for name, value in values.items())
         bench.report(f"trying {said}")
         found = bench.responses(values)

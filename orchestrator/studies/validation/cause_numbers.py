@@ -50,22 +50,27 @@ def promises_of(
     bench: CauseBench, parameters: Iterable[VariableInfo], others: Sequence[str] = ()
 ) -> Iterator[Promise]:
     """The numbers among some parameters that move the response at all; ``others``: as in `follow`."""
-    for info in parameters:
-        one = adjustable(bench.device, info, None)
-        if one.high <= one.low:
-            continue
-        step = _STEP * one.reach
-        step = step if one.start + step <= one.high else -step
+    numbers = [(info, adjustable(bench.device, info, None)) for info in parameters]
+    free = [(info, one, _small_step(one)) for info, one in numbers if one.high > one.low]
+    moved = [dict.fromkeys((one.name, *others), one.start + step) for _, one, step in free]
+    bench.announce(moved)
+    for (info, one, step), values in zip(free, moved, strict=True):
         bench.report(f"sensitivity to {one.name}")
-        found = bench.responses(dict.fromkeys((one.name, *others), one.start + step))
+        found = bench.responses(values)
         if found is None:
             continue
         slope = (bench.errors(found) - bench.error) / step
         if float(slope @ slope) * one.reach**2 > _SETTLED**2 * float(bench.error @ bench.error):
             pairs = zip(found, bench.base, strict=True)
-            yield Promise(one, [(moved - base) / step for moved, base in pairs], slope)
+            yield Promise(one, [(power - base) / step for power, base in pairs], slope)
         else:
             bench.idle.append(info)
+
+
+def _small_step(one: Adjustable) -> float:
+    """A difference for a sensitivity, to the side at which the number may be."""
+    step = _STEP * one.reach
+    return step if one.start + step <= one.high else -step
 
 
 def follow(
@@ -121,6 +126,12 @@ def numbers_by_factors(
     One that moves nothing where it is may be a limit that is not reached: it is tried lower."""
     moving = [(one.number, _FACTORS) for one in promises]
     idle = [(adjustable(bench.device, info, None), _FACTORS[:1]) for info in rough.idle]
+    rough.announce(
+        {number.name: factor * number.start}
+        for number, factors in [*moving, *idle]
+        for factor in factors
+        if _may_be(number, factor * number.start)
+    )
     found: list[tuple[float, Adjustable, _Place]] = []
     for number, factors in [*moving, *idle]:
         places = [place for factor in factors for place in _along_factors(rough, number, factor)]
@@ -133,12 +144,17 @@ def numbers_by_factors(
         yield _confirmed(bench, rough, number, (value, left))
 
 
+def _may_be(number: Adjustable, value: float) -> bool:
+    """Return whether a positive number may have a value at a factor of its own."""
+    return number.start > 0 and number.low <= value <= number.high
+
+
 def _along_factors(rough: CauseBench, number: Adjustable, factor: float) -> Iterator[_Place]:
     """A number at a factor, at its square and so on, as long as each leaves less than the one before."""
     at, error = number.start, rough.error
     for _ in range(_MOST_FACTORS):
         value = factor * at
-        if at <= 0 or not number.low <= value <= number.high:
+        if not _may_be(number, value):
             return
         rough.report(f"trying {number.name} = {value:.4g}")
         found = rough.responses({number.name: value})

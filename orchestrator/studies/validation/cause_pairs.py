@@ -63,6 +63,8 @@ def cause_beside(bench: CauseBench, rough: CauseBench, first: Explanation) -> It
 def _positions_beside(bench: CauseBench, first: str) -> Iterator[Values]:
     """The other positions that leave the least beside a first cause, and less than it does by itself."""
     found: list[tuple[float, Values]] = []
+    others = [(info.name, value) for info, value in other_positions(bench)]
+    bench.announce({name: value} for name, value in others if name != first)
     for info, value in other_positions(bench):
         bench.report(f"trying {info.name} = {str(value).lower()} beside {first}")
         answers = None if info.name == first else bench.responses({info.name: value})
@@ -88,8 +90,10 @@ def pair_of_limits(
     part = first.name.rpartition(".")[0]
     others = [name for name in likely if name != first.name and name.rpartition(".")[0] == part]
     tried: list[tuple[float, Values]] = []
-    for name, level in itertools.product(others, _LEVELS_BESIDE):
-        values: Values = {**first.values, name: level * seen}
+    levels = list(itertools.product(others, _LEVELS_BESIDE))
+    each: list[Values] = [{**first.values, name: level * seen} for name, level in levels]
+    rough.announce(each)
+    for (name, level), values in zip(levels, each, strict=True):
         bench.report(f"trying {name} = {level * seen:.4g} beside {first.name}")
         found = rough.responses(values)
         if found is not None:

@@ -17,12 +17,18 @@ from orchestrator.devices.fmi.component import Component, RealBatch
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.device_or_controller import NO_BUS, PORT, is_controller_alone
 from orchestrator.devices.fmi.instance import is_ours
-from orchestrator.studies.black_box.bench import Stretches, drive
+from orchestrator.studies.black_box.bench import MOST_BESIDE, Stretches, drive
 from orchestrator.studies.validation.averaging import averaged
 from orchestrator.studies.validation.held_in_step import hold_at_once, hold_in_step, steps_held
 from orchestrator.studies.validation.instances import InstanceRun, InstanceShelf
 from orchestrator.studies.validation.over_limit import OverLimit, limit_outputs, over_limit
 from orchestrator.studies.validation.record import Recording
+from orchestrator.studies.validation.side_by_side import (
+    AskingRun,
+    StepsAsked,
+    run_alone,
+    run_beside,
+)
 from orchestrator.studies.validation.trials import TrialLog
 from orchestrator.systems.coupling.step_awareness import STEP_PARAMETER
 
@@ -39,6 +45,7 @@ _ROUGH_STEP = (
 _PROBE_STEPS = 200  # that move most states of a device
 _PROBE_JUMP = 0.95 + 0.05j  # of the voltage, in magnitude and angle
 _LONGEST_REST = 20.0  # time [s] after which it is driven, at rest or not
+_FEWEST = 3  # plays that are sooner made side by side than one by one
 
 
 @dataclass(frozen=True)
@@ -79,6 +86,50 @@ class Played:
 
 
 @dataclass(frozen=True)
+class Play:
+    """A device by a recording, from an operating point on."""
+
+    device: PlayedDevice
+    recording: Recording
+    start: OperatingStart
+
+    def same_as(self, other: Play) -> bool:
+        """Return whether both give the same: their recordings are one, which is not compared."""
+        mine, others = ((one.device, one.start) for one in (self, other))
+        return self.recording is other.recording and mine == others
+
+    @property
+    def goes_beside(self) -> bool:
+        """Return whether it can be made beside others: the voltage does not turn with it, and it runs in here."""
+        return not (self.device.gives_way or self.device.isolated)
+
+
+class AnnouncedPlays:
+    """Plays that are likely asked for, and those that were made beside the first one that was."""
+
+    def __init__(self) -> None:
+        self._awaited: list[Play] = []
+        self._made: list[tuple[Play, Played]] = []
+
+    def renew(self, plays: Sequence[Play]) -> None:
+        """Await others in place of those that were awaited before."""
+        self._awaited, self._made = [one for one in plays if one.goes_beside], []
+
+    def take(self, play: Play) -> Played | None:
+        """The outcome of a play that was made beside others; None of one that is to be made alone."""
+        for k, one in enumerate(self._awaited):
+            if one.same_as(play):
+                beside = self._awaited[k : k + MOST_BESIDE]
+                del self._awaited[: k + MOST_BESIDE]
+                self._made += _made_beside(beside)
+                break
+        for k, (one, _) in enumerate(self._made):
+            if one.same_as(play):
+                return self._made.pop(k)[1]
+        return None
+
+
+@dataclass(frozen=True)
 class PlayedDevice:
     """A device with its values, at a port of ours."""
 
@@ -93,6 +144,7 @@ class PlayedDevice:
     gives_way: bool = False  # whether the voltage turns with it, so that it stays in step
     shelf: InstanceShelf = field(default_factory=InstanceShelf, compare=False)
     trials: TrialLog = field(default_factory=TrialLog, compare=False)  # that it refused
+    announced: AnnouncedPlays = field(default_factory=AnnouncedPlays, compare=False)
 
     @property
     def path(self) -> Path:
@@ -148,19 +200,38 @@ class PlayedDevice:
         The voltage of a step is that at its begin, as in a coupled run. A longer step takes the mean of what such short
         steps would hold, and its end what the last of them would: that at its begin alone would be late by half of it
         in what a device integrates, and by all of it in what follows the voltage at once."""
-        values = {**self._told_step(), **self._start_values(start), **self.values}
-
-        def begun(component: Component) -> Component:
-            return self._begin(component, values, start)
-
+        made = self.announced.take(Play(self, recording, start))
+        if made is not None:
+            return made
+        values = self._values_at(start)
         run = InstanceRun(
             self.description,
             self.isolated,
             values,
-            work=lambda component: self._run(begun(component), recording, start),
-            probe=lambda component: self._probe(begun(component), start),
+            work=lambda component: run_alone(
+                self.asking_run(component, recording, start), component
+            ),
+            probe=lambda component: self._probe(self._begin(component, values, start), start),
         )
         return self.shelf.run(run)
+
+    def announce(self, plays: Sequence[Play]) -> None:
+        """Tell which plays will likely be asked for next, in their order, of this device with any values.
+
+        They are then made side by side where they can be, each with the bits that it has alone. What was announced
+        before is forgotten."""
+        self.announced.renew(plays)
+
+    def asking_run(
+        self, component: Component, recording: Recording, start: OperatingStart
+    ) -> AskingRun[Played]:
+        """A run of an instance from its start on, which asks for its steps."""
+        self._begin(component, self._values_at(start), start)
+        return (yield from self._run(component, recording, start))
+
+    def _values_at(self, start: OperatingStart) -> dict[str, float | bool]:
+        """The values of a run at an operating point."""
+        return {**self._told_step(), **self._start_values(start), **self.values}
 
     def _begin(
         self, component: Component, values: Mapping[str, float | bool], start: OperatingStart
@@ -179,12 +250,14 @@ class PlayedDevice:
         jumped = np.full(_PROBE_STEPS, start.voltage * _PROBE_JUMP)
         return drive(component, _NAMES, _columns(jumped), self.step_size)
 
-    def _run(self, component: Component, recording: Recording, start: OperatingStart) -> Played:
+    def _run(
+        self, component: Component, recording: Recording, start: OperatingStart
+    ) -> AskingRun[Played]:
         """A run of an instance that stands at the operating point."""
         at = (start.voltage.real, start.voltage.imag)
         begin = RealBatch(component, _CURRENT).read().copy()
-        before = self._rest(component, at, begin)
-        driven, over = self._driven(component, recording, before)
+        before = yield from self._rest(at, begin)
+        driven, over = yield from self._driven(component, recording, before)
         rest = start.voltage * complex(*before[-1]).conjugate() * SYSTEM_BASE_MVA / self.rating
         settled_after = (len(before) - 1) * self.step_size
         still = settled_after < _LONGEST_REST
@@ -223,21 +296,21 @@ class PlayedDevice:
                 )
         return {name: value for name, value in found.items() if name in self.description.variables}
 
-    def _rest(self, component: Component, at: tuple[float, float], begin: Numbers) -> Numbers:
+    def _rest(self, at: tuple[float, float], begin: Numbers) -> AskingRun[Numbers]:
         """Currents while the voltage before the event is held, until they are still; the first is that of the start."""
         each = max(1, round(_ROUND / self.step_size))
         rows = [begin[None, :]]
         held = np.tile(at, (each, 1))
         scale = SYSTEM_BASE_MVA / self.rating
         for k in range(round(_LONGEST_REST / _ROUND)):
-            rows.append(drive(component, _NAMES, held, self.step_size, k * each))
+            rows.append((yield StepsAsked(_NAMES, held, self.step_size, k * each)))
             if np.abs(rows[-1] - rows[-2][-1]).max() * scale <= _STILL:
                 break
         return np.concatenate(rows)
 
     def _driven(
         self, component: Component, recording: Recording, before: Numbers
-    ) -> tuple[Complex, OverLimit | None]:
+    ) -> AskingRun[tuple[Complex, OverLimit | None]]:
         """Power at the recording's times [pu of the rating], as means over as long as the recording's.
 
         And where the current is above a limit that the device lacks, unless the voltage turns with it."""
@@ -252,8 +325,9 @@ class PlayedDevice:
         if self.gives_way:
             currents, turn[1:] = self._held_in_step(component, recording, held, index)
         else:
-            late = held[:, -1] if held.shape[1] > 1 else None
-            outputs = self._outputs(component, held.mean(axis=1), late, index)
+            late = _columns(held[:, -1]) if held.shape[1] > 1 else None
+            inputs = _columns(held.mean(axis=1))
+            outputs = yield StepsAsked(self._names, inputs, self.step_size, index, late)
             currents = outputs[:, :2] @ _IN_PHASOR
             over = over_limit(outputs[:, 2], self.step_size) if outputs.shape[1] > 2 else None
         currents = np.concatenate([before[-1:] @ _IN_PHASOR, currents])
@@ -284,13 +358,6 @@ class PlayedDevice:
             run = hold_in_step(stretch, voltage, measured, self.step_size)
         return run.current / scale, run.turn
 
-    def _outputs(
-        self, component: Component, voltage: Complex, late: Complex | None, index: int
-    ) -> Numbers:
-        """The current after steps with so many voltages, in the device's unit, and its part of a limit it lacks."""
-        read = None if late is None else _columns(late)
-        return drive(component, self._names, _columns(voltage), self.step_size, index, late=read)
-
     @cached_property
     def _names(self) -> tuple[Sequence[str], Sequence[str]]:
         """Names of the inputs and of the outputs of a run."""
@@ -305,3 +372,19 @@ class PlayedDevice:
 
 def _columns(values: Complex) -> Numbers:
     return np.ascontiguousarray(values).view(float).reshape(-1, 2)
+
+
+def _made_beside(plays: Sequence[Play]) -> list[tuple[Play, Played]]:
+    """Plays with their outcomes; without those that fail, and none where too few go side by side."""
+    if len(plays) < _FEWEST:
+        return []
+    device = plays[0].device
+    with device.shelf.side_by_side(device.description, len(plays)) as components:
+        if not components:
+            return []
+        runs = [
+            one.device.asking_run(component, one.recording, one.start)
+            for one, component in zip(plays, components, strict=True)
+        ]
+        found = run_beside(runs, components)
+    return [(plays[number], played) for number, played in sorted(found.items())]

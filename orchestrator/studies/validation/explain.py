@@ -191,6 +191,7 @@ def _looked_at(device: PlayedDevice, events: Sequence[RecordedEvent]) -> list[Re
 def _positions(bench: CauseBench, rough: CauseBench) -> Iterator[Explanation]:
     """Other positions of switches and of kinds, whole numbers within bounds, that do not fail at a first look."""
     best: Explanation | None = None
+    rough.announce({info.name: value} for info, value in other_positions(bench))
     for info, value in other_positions(bench):
         bench.report(f"trying {info.name} = {str(value).lower()}")
         looked = rough.responses({info.name: value})

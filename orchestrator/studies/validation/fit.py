@@ -307,6 +307,7 @@ def _best_of_curves(
         residuals.report(f"looking along {one.name}")
         curve = {factor * one.start for factor in factors} | {float(values[one.name])}
         inside = sorted(x for x in curve if one.low <= x <= one.high)
+        residuals.announce([{**values, one.name: x} for x in inside])
         costs = [cost(one.name, x) for x in inside]
         values[one.name] = inside[int(np.argmin(costs))]
         found.append(replace(one, start=float(values[one.name])))

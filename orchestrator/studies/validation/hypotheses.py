@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers, rms
+from orchestrator.core.errors import CosimError
 from orchestrator.core.options import Option
 from orchestrator.studies.validation.angle_reference import ask_of_lacking_frequency
 from orchestrator.studies.validation.causes import cap_of_current
-from orchestrator.studies.validation.device import PlayedDevice
+from orchestrator.studies.validation.device import Play, PlayedDevice
 from orchestrator.studies.validation.event import (
     EventComparison,
     RecordedEvent,
@@ -294,12 +295,14 @@ def _likeliest(comparison: EventComparison, bases: PortBases, error: float) -> l
     event, device = comparison.event, comparison.device
     near = cut_event(event, _AFTER, _BEFORE)
     here = math.hypot(*rms_error(comparison.near_power(near), near))
-    readings = [*READINGS, *_scalings(comparison)]
+    readings = [x for x in (*READINGS, *_scalings(comparison)) if x.fits(event.recording)]
+    changed = [_read_so(near, reading.change, bases) for reading in readings]
+    read = filter(None, changed)
+    device.announce([Play(device.rough, one.recording, one.start) for one in read])
     tried = [
         (trial.rest_of_error, reading)
-        for reading in readings
-        if reading.fits(event.recording)
-        for trial in _trials_of(device.rough, near, reading, bases)
+        for reading, known in zip(readings, changed, strict=True)
+        for trial in _trials_of(device.rough, near, reading, bases, known)
         if trial.rest_of_error <= reading.leaves * here
     ]
     if not tried:
@@ -467,12 +470,28 @@ def _followed_as_it_is(comparison: EventComparison, trial: _Trial) -> bool:
     return followed > _FOLLOWED
 
 
+def _read_so(
+    event: RecordedEvent, change: Callable[[Recording], Recording], bases: PortBases
+) -> RecordedEvent | None:
+    """The event as it is after a change of its recording; None where it cannot be read so."""
+    try:
+        return prepare_event(change(event.recording), bases, event.windows)
+    except CosimError:
+        return None
+
+
 def _trials_of(
-    device: PlayedDevice, event: RecordedEvent, reading: Reading, bases: PortBases
+    device: PlayedDevice,
+    event: RecordedEvent,
+    reading: Reading,
+    bases: PortBases,
+    known: RecordedEvent | None = None,
 ) -> Iterator[_Trial]:
-    """A device's answer to a recording that is read otherwise; nothing where it cannot start so."""
+    """A device's answer to a recording that is read otherwise; nothing where it cannot start so.
+
+    ``known``: the event as it then is, where that was found before."""
     with device.trials.trial(reading.name, of_reading=True):
-        changed = prepare_event(reading.change(event.recording), bases, event.windows)
+        changed = known or prepare_event(reading.change(event.recording), bases, event.windows)
         yield _Trial(reading, changed, device.play(changed.recording, changed.start).power)
 
 
@@ -482,18 +501,35 @@ def _meter_elsewhere(
     """A transformer between meters and port that explains most of the error, and the part that is left."""
     if bases.between.impedance:
         return
-    for beyond in Beyond:
-        yield from _meters_beyond(comparison, bases, error, beyond)
+    near = cut_event(comparison.event, _AFTER, _BEFORE)
+    tried = {one: _read_so(near, _beyond(_TRIED_REACTANCE, one), bases) for one in Beyond}
+    device = comparison.device
+    read = filter(None, tried.values())
+    device.announce([Play(device, one.recording, one.start) for one in read])
+    for beyond, known in tried.items():
+        yield from _meters_beyond(comparison, bases, error, (beyond, near, known))
+
+
+def _beyond(reactance: float, beyond: Beyond) -> Callable[[Recording], Recording]:
+    """A change by a transformer between meters and port."""
+    return lambda recording: at_port(recording, Between(1j * reactance, beyond))
 
 
 def _meters_beyond(
-    comparison: EventComparison, bases: PortBases, error: float, beyond: Beyond
+    comparison: EventComparison,
+    bases: PortBases,
+    error: float,
+    tried: tuple[Beyond, RecordedEvent, RecordedEvent | None],
 ) -> Iterator[tuple[float, Question]]:
-    near, device = cut_event(comparison.event, _AFTER, _BEFORE), comparison.device
+    """A transformer beyond some meters.
 
-    def misses(event: RecordedEvent, reactance: float) -> Complex:
-        moved = at_port(event.recording, Between(1j * reactance, beyond))
-        changed = prepare_event(moved, bases, event.windows)
+    ``tried``: these meters, a part of the event, and how that is with a usual transformer where it can be read so."""
+    beyond, near, known = tried
+    device = comparison.device
+
+    def misses(event: RecordedEvent, reactance: float, read: RecordedEvent | None) -> Complex:
+        change = _beyond(reactance, beyond)
+        changed = read or prepare_event(change(event.recording), bases, event.windows)
         played = device.play(changed.recording, changed.start)
         part = event.recording.good & (event.recording.times > event.windows.begin)
         return np.asarray((played.power - changed.recording.power)[part])
@@ -504,7 +540,7 @@ def _meters_beyond(
     with device.trials.trial(
         f"a transformer between port and meters{_which(beyond)}", of_reading=True
     ):
-        way = misses(near, _TRIED_REACTANCE) - here
+        way = misses(near, _TRIED_REACTANCE, known) - here
         size = float(np.sum(np.abs(way) ** 2))
         times = -float(np.real(np.vdot(way, here))) / size if size > 0 else 0.0
         reactance = times * _TRIED_REACTANCE
@@ -512,7 +548,7 @@ def _meters_beyond(
         likely = _REACTANCES[0] <= abs(reactance) <= _REACTANCES[1] and rest < _PROMISES**2
         if not likely:
             return
-        left = float(np.sqrt(np.mean(np.abs(misses(comparison.event, reactance)) ** 2)))
+        left = float(np.sqrt(np.mean(np.abs(misses(comparison.event, reactance, None)) ** 2)))
     if left <= (_LEAVES if beyond is Beyond.ALL else _LEAVES_ALONE) * error:
         figures = {"reactance": reactance, "error": error, "left": left, "of": str(beyond)}
         yield left / error, Question(QuestionKind.METER_ELSEWHERE, figures)

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Generic, Protocol, Self, TypeVar
 
 import numpy as np
 
+from fmus.toolchain.removal import remove_tree
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import CosimError
+from orchestrator.devices.fmi.archive import extract
 from orchestrator.devices.fmi.component import Component
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.instance import is_ours, open_component
@@ -69,6 +72,48 @@ class _Trust:
     lost: bool = False
 
 
+@dataclass
+class _Team:
+    """Instances of one library that step side by side and wait for their next run, all in one folder."""
+
+    description: FmuDescription
+    directory: Path
+    components: list[Component] = field(default_factory=list)
+
+    @staticmethod
+    def of(description: FmuDescription) -> _Team | None:
+        """A team of one of our own FMUs; None where its instances do not step side by side."""
+        if not is_ours(description.path):
+            return None
+        team = _Team(description, extract(description.path))
+        try:
+            team.components.append(team.open_another())
+        except BaseException:
+            team.close()
+            raise
+        if team.components[0].step_stack is not None:
+            return team
+        team.close()
+        return None
+
+    def open_another(self) -> Component:
+        return open_component("device", self.description, self.directory, isolated=False)
+
+    def take(self, count: int) -> list[Component]:
+        """Take so many of them, at their start."""
+        while len(self.components) < count:
+            self.components.append(self.open_another())
+        for one in self.components[:count]:
+            one.reset()
+        found, self.components = self.components[:count], self.components[count:]
+        return found
+
+    def close(self) -> None:
+        while self.components:
+            self.components.pop().close()
+        remove_tree(self.directory)
+
+
 class InstanceShelf:
     """Instances that are used again instead of being opened anew, between `keeping` and its end.
 
@@ -81,6 +126,7 @@ class InstanceShelf:
     def __init__(self) -> None:
         self._free: dict[int, _Kept] = {}
         self._trust: dict[int, _Trust] = {}
+        self._teams: dict[int, _Team | None] = {}
         self._keeps = 0
 
     @contextmanager
@@ -94,6 +140,32 @@ class InstanceShelf:
             if not self._keeps:
                 while self._free:
                     self._free.popitem()[1].component.close()
+                for team in filter(None, self._teams.values()):
+                    team.close()
+                self._teams.clear()
+
+    @contextmanager
+    def side_by_side(self, description: FmuDescription, count: int) -> Iterator[list[Component]]:
+        """So many instances at their start that step side by side; none where they do not, or are not kept.
+
+        Whoever takes one out of the list has to close it: one that failed is not used again."""
+        team = self._team_of(description)
+        taken = [] if team is None else team.take(count)
+        try:
+            yield taken
+        except BaseException:
+            for one in taken:
+                one.close()
+            raise
+        if team is not None:
+            team.components += taken
+
+    def _team_of(self, description: FmuDescription) -> _Team | None:
+        if not self._keeps:
+            return None
+        if id(description) not in self._teams:
+            self._teams[id(description)] = _Team.of(description)
+        return self._teams[id(description)]
 
     def run(self, one: InstanceRun[Outcome]) -> Outcome:
         """The outcome of a run; an instance that failed is not used again."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers, rms
-from orchestrator.studies.validation.device import PlayedDevice
+from orchestrator.studies.validation.device import Play, PlayedDevice
 from orchestrator.studies.validation.event import (
     EventComparison,
     RecordedEvent,
@@ -125,13 +125,13 @@ def _lost(
     device = comparison.device.rough
     if device is not comparison.device:
         power = device.play(near.recording, near.start).power
-    found = [
-        one for smoothing in smoothings for one in _tried(device, near, power, (part, smoothing))
-    ]
+    values = part.values(near.recording.voltage)
+    ways = [_way_of(near.recording, part, one, values) for one in smoothings]
+    device.announce([Play(device, one.recording, near.start) for one in ways])
+    found = [one for way in ways for one in _tried(device, near, power, way)]
     if not found:
         return
     left, length, lost = min(found, key=lambda one: one[0])
-    values = part.values(near.recording.voltage)
     jumps = _fastest(values + lost, near.recording) > _TIMES * _fastest(values, near.recording)
     if left > _EXPLAINS * error or not jumps:
         return
@@ -145,24 +145,36 @@ def _lost(
     yield left / error, Question(part.kind, figures)
 
 
+@dataclass(frozen=True)
+class _Way:
+    """A smoothing with the values that it took away, and the recording that is sharper by a small part of them."""
+
+    of: SmoothedPart
+    smoothing: Smoothing
+    lost: Numbers
+    part: float
+    recording: Recording
+
+
+def _way_of(recording: Recording, of: SmoothedPart, smoothing: Smoothing, values: Numbers) -> _Way:
+    lost = smoothing.lost(values, recording.interval)
+    part = min(1.0, _SMALL / max(float(np.abs(lost).max()), _SMALL))
+    return _Way(of, smoothing, lost, part, _sharper(recording, of, part * lost))
+
+
 def _tried(
-    device: PlayedDevice,
-    near: RecordedEvent,
-    base: Complex,
-    smoothed: tuple[SmoothedPart, Smoothing],
+    device: PlayedDevice, near: RecordedEvent, base: Complex, way: _Way
 ) -> Iterator[tuple[float, float, Numbers]]:
     """The rms error left [pu], the likeliest length of the smoothing [s] and what was lost.
 
     ``base``: what the device does by the recorded voltage. None if it cannot run, or a straight line promises too
     little."""
     recording = near.recording
-    of, smoothing = smoothed
-    lost = smoothing.lost(of.values(recording.voltage), recording.interval)
-    part = min(1.0, _SMALL / max(float(np.abs(lost).max()), _SMALL))
+    of, smoothing, lost = way.of, way.smoothing, way.lost
     with device.trials.trial(
         f"{of.name} smoothed over {1000 * smoothing.length:g} ms", of_reading=True
     ):
-        moves = (device.play(_sharper(recording, of, part * lost), near.start).power - base) / part
+        moves = (device.play(way.recording, near.start).power - base) / way.part
         off = recording.power - base
         good = recording.good
         size = float(np.sum(np.abs(moves[good]) ** 2))

@@ -161,6 +161,7 @@ def _found_again(
         return _REFUSED if found is None else squares_of(bench.errors(found))
 
     looked = np.linspace(low, high, _LOOKS)
+    bench.announce(dict.fromkeys((one.name for one in numbers), float(x)) for x in looked)
     least = int(np.argmin([squares_at(float(one)) for one in looked]))
     near = float(looked[max(least - 1, 0)]), float(looked[min(least + 1, _LOOKS - 1)])
     best = optimize.minimize_scalar(

@@ -11,7 +11,7 @@ import numpy as np
 from orchestrator.core.arrays import Complex, Matrix, Numbers, Vector
 from orchestrator.core.errors import CosimError, InputError
 from orchestrator.studies.validation.correlation import correlation_length
-from orchestrator.studies.validation.device import PlayedDevice
+from orchestrator.studies.validation.device import Play, PlayedDevice
 from orchestrator.studies.validation.event import RecordedEvent, noise_before
 from orchestrator.studies.validation.hidden import (
     HiddenVoltage,
@@ -57,6 +57,7 @@ class Residuals:
     report: Report = lambda text: None
     _made: int = 0
     hidden: Sequence[HiddenVoltage] = field(init=False)
+    _moved: dict[tuple[object, ...], Recording] = field(default_factory=dict)
     _kept: dict[tuple[tuple[str, float | bool], ...], Numbers] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -77,19 +78,42 @@ class Residuals:
         """Errors with other values, in scatters; those of values with which the device does not run are large."""
         key = tuple(sorted(values.items()))
         if key not in self._kept:
-            unknown = {one.name for one in self.hidden}
-            own = {name: value for name, value in values.items() if name not in unknown}
-            device = self.device.with_values(own)
+            device = self._device_with(values)
             parts = [self._of(device, k, values) for k in range(len(self.stretches))]
             self._kept[key] = np.concatenate([*parts, likelihoods(self.hidden, values)])
         return self._kept[key]
 
+    def announce(self, each: Sequence[Values]) -> None:
+        """Tell with which values errors will be asked for, one after the other: runs may be made side by side."""
+        self._moved.clear()
+        anew = [one for one in each if tuple(sorted(one.items())) not in self._kept]
+        plays = [
+            Play(self._device_with(values), self._recording(k, values), stretch.event.start)
+            for values in anew
+            for k, stretch in enumerate(self.stretches)
+        ]
+        self.device.announce(plays)
+
+    def _device_with(self, values: Values) -> PlayedDevice:
+        unknown = {one.name for one in self.hidden}
+        return self.device.with_values(
+            {name: value for name, value in values.items() if name not in unknown}
+        )
+
+    def _recording(self, number: int, values: Values) -> Recording:
+        """The recording of one event with the hidden parts of its voltage; the same one for the same parts."""
+        unknown = [one for one in self.hidden if one.event == number]
+        key = (number, *(values.get(one.name) for one in unknown))
+        if key not in self._moved:
+            recording = self.stretches[number].event.recording
+            self._moved[key] = with_hidden(recording, unknown, values)
+        return self._moved[key]
+
     def _of(self, device: PlayedDevice, number: int, values: Values) -> Numbers:
         stretch = self.stretches[number]
         event = stretch.event
-        unknown = [one for one in self.hidden if one.event == number]
         try:
-            power = device.play(with_hidden(event.recording, unknown, values), event.start).power
+            power = device.play(self._recording(number, values), event.start).power
         except InputError:
             raise
         except CosimError as error:
@@ -159,6 +183,15 @@ class Residuals:
     ) -> Matrix:
         """How the errors move with each parameter, a column each, by differences to one side or to both."""
         columns = []
+        own = {name: float(values[name]) for name in steps}
+        ways = (1, -1) if both_sides else (1,)
+        self.announce(
+            [
+                {**values, name: own[name] + way * step}
+                for name, step in steps.items()
+                for way in ways
+            ]
+        )
         for name, step in steps.items():
             self.report(f"sensitivity to {name}")
             at = float(values[name])
@@ -171,8 +204,12 @@ class Residuals:
         """How the errors move with each hidden part of the voltage, a column each [1/pu]."""
         here = self.at(values)
         columns = []
-        for one in self.hidden:
-            other = {**values, one.name: float(values.get(one.name, 0.0)) + one.scale}
+        others = [
+            {**values, one.name: float(values.get(one.name, 0.0)) + one.scale}
+            for one in self.hidden
+        ]
+        self.announce(others)
+        for one, other in zip(self.hidden, others, strict=True):
             columns.append((self.at(other) - here) / one.scale)
         return np.column_stack(columns) if columns else np.empty((len(here), 0))
 

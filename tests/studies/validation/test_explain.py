@@ -117,6 +117,9 @@ class TwoValleys:
     def report(self, text):
         pass
 
+    def announce(self, each):
+        self.announced = list(each)
+
     def responses(self, values):
         self.asked.append(values["x"])
         return values["x"]
