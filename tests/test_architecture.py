@@ -81,9 +81,11 @@ PLAIN_DATA = {"fmus.grid.names", "fmus.toolchain.port_variables", "fmus.toolchai
 """Modules of the FMUs that the whole orchestrator may read."""
 
 
-SHARED_TOOLS = {f"fmus.toolchain.{name}" for name in ("extras", "plugins", "removal", "temporary")}
+SHARED_TOOLS = {
+    f"fmus.toolchain.{name}" for name in ("extras", "plugins", "removal", "slave_code", "temporary")
+}
 """Modules of the FMUs that the whole orchestrator may use: they say which library is missing, find what is installed,
-and keep folders."""
+keep folders, and hand out compiled code."""
 
 
 @dataclass(frozen=True)

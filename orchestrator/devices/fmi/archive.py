@@ -15,6 +15,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
+from io import BufferedWriter
 from pathlib import Path, PurePosixPath
 from xml.etree import ElementTree
 from xml.parsers import expat
@@ -282,7 +283,7 @@ def _fault_of(entry: zipfile.ZipInfo) -> str | None:
     name = entry.orig_filename.replace("\\", "/")  # by itself no harm, wherever it leads
     kind = stat.S_IFMT(entry.external_attr >> 16)
     parts = name.removesuffix("/").split("/")
-    if not name or "\0" in name or any(unicodedata.category(c) == "Cc" for c in name):
+    if not name or _has_control_characters(name):
         return "a name with control characters"
     if name.startswith("/") or ":" in name:
         return _OUTSIDE[0]
@@ -308,6 +309,11 @@ def _fault_of(entry: zipfile.ZipInfo) -> str | None:
     return None
 
 
+def _has_control_characters(name: str) -> bool:
+    """Also a zero, which is one; what can be printed has none, which is seen sooner."""
+    return not name.isprintable() and any(unicodedata.category(c) == "Cc" for c in name)
+
+
 def error_text(error: Exception) -> str:
     """An error's own text, cut where a file's contents made it long."""
     text = str(error) or type(error).__name__
@@ -326,8 +332,7 @@ def _write(
     if entry.is_dir():
         target.mkdir(parents=True, exist_ok=True)
         return left
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with archive.open(entry) as source, target.open("xb") as sink:
+    with archive.open(entry) as source, _new_file(target) as sink:
         while chunk := source.read(_CHUNK):
             left -= len(chunk)
             if left < 0:
@@ -337,6 +342,14 @@ def _write(
                 )
             sink.write(chunk)
     return left
+
+
+def _new_file(path: Path) -> BufferedWriter:
+    try:
+        return path.open("xb")
+    except FileNotFoundError:  # the first of its folder
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path.open("xb")
 
 
 _ORIGIN = {

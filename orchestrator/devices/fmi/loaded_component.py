@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fmus.toolchain.removal import remove_tree
 from orchestrator.core.errors import ComponentError, FmuFileError, InputError, UnsupportedFmuError
 from orchestrator.core.interrupts import calls
-from orchestrator.devices.fmi.archive import MODEL_DESCRIPTION, extract
+from orchestrator.devices.fmi.archive import MODEL_DESCRIPTION
 from orchestrator.devices.fmi.binary import (
     FMU2Tolerant,
     absent_functions,
@@ -31,6 +31,7 @@ from orchestrator.devices.fmi.fmi3 import Fmi3Library, adapter_path
 from orchestrator.devices.fmi.interpreter_turn import turn
 from orchestrator.devices.fmi.messages import Messages, callbacks_for, texts
 from orchestrator.devices.fmi.refused_calls import FATAL, check_log, in_its_words, refusal
+from orchestrator.devices.fmi.unpacked import extract_with_code
 from orchestrator.devices.sandbox.compiled_programs import proxy_path
 from orchestrator.devices.sandbox.wine import NoWineError
 from orchestrator.devices.sandbox.wine_program import WineProgram
@@ -70,7 +71,7 @@ class LoadedComponent(Derived):
         self.description = description
         self.lost = False
         self._messages = Messages()
-        self._own_directory = None if directory else extract(description.path)
+        self._own_directory = None if directory else extract_with_code(description.path)
         self._brought = brought_by(Path(directory or self._own_directory or "") / "resources")
         self._callbacks = callbacks_for(self._messages)
         self._fmu: Any = None

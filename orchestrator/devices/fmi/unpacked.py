@@ -11,6 +11,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from fmus.toolchain.slave_code import lay_code
 from fmus.toolchain.temporary import remove
 from orchestrator.devices.fmi.archive import extract
 
@@ -33,6 +34,13 @@ _one_at_a_time = threading.Lock()
 _process = os.getpid()
 
 
+def extract_with_code(path: Path) -> Path:
+    """Unpack an FMU into a new temporary folder, in which Python finds our own modules compiled."""
+    folder = extract(path)
+    lay_code(folder / "resources")
+    return folder
+
+
 @contextmanager
 def unpacked(path: Path) -> Iterator[Path]:
     """The folder into which an FMU of our own is unpacked; nobody may write there.
@@ -44,7 +52,7 @@ def unpacked(path: Path) -> Iterator[Path]:
         _forget_those_of_another_process()
         folder = _folders.pop(key, None)
         if folder is None or not folder.path.exists():
-            folder = _Folder(extract(path))
+            folder = _Folder(extract_with_code(path))
         _folders[key] = folder
         folder.users += 1
     try:
