@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import ComponentError, InputError
 from orchestrator.devices.acceptance.linear_network import LinearNetwork
-from orchestrator.devices.acceptance.shifted_clock import with_shift
+from orchestrator.devices.acceptance.shifted_clock import for_shifts
 from orchestrator.devices.fmi.component import RealBatch
 from orchestrator.devices.fmi.description import FmuDescription, runs_under_wine
 from orchestrator.devices.fmi.port_mapping import BoundDescription
@@ -74,14 +74,19 @@ class FmuProcess:
         self._library = unlocked_library()
         fmu = description.path.resolve()
         port = asdict(description.port) if isinstance(description, BoundDescription) else None
-        request = {"fmu": str(fmu), "port": port, "directory": str(directory)}
+        request = {
+            "fmu": str(fmu),
+            "port": port,
+            "directory": str(directory),
+            "clock_shift": clock_shift,
+        }
         self._process = ConfinedProcess(
             "orchestrator.devices.acceptance.worker",
             request,
             [fmu, directory],
             limits,
             windows=runs_under_wine(description),
-            variables=with_shift(clock_shift) if clock_shift else None,
+            variables=for_shifts() if clock_shift else None,
         )
         try:
             self.box = self._process.box

@@ -1,4 +1,5 @@
 /* Loaded before the C library, it shows a process another date and time of day. What measures durations stays.
+   By how much they are shifted, it reads when it is loaded, and when a process that has it is told to read it again.
    Linux alone loads it; for other systems the library is empty, so that a wheel is built in one way. */
 #ifdef __linux__
 #define _GNU_SOURCE
@@ -15,7 +16,7 @@
 
 static long shift; /* [s] */
 
-__attribute__((constructor)) static void read_shift(void) {
+__attribute__((constructor)) EXPORT void gfor_read_clock_shift(void) {
     const char *text = getenv("GFOR_COSIM_CLOCK_SHIFT");
     if (text) shift = atol(text);
 }

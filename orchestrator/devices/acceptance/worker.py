@@ -9,12 +9,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from orchestrator.devices.acceptance.shifted_clock import shift_clock
 from orchestrator.devices.fmi.binary import absent_functions, load, unload
 from orchestrator.devices.fmi.bound_component import BoundComponent
 from orchestrator.devices.fmi.component import Component
 from orchestrator.devices.fmi.description import FmuDescription, runs_under_wine
 from orchestrator.devices.fmi.instance import open_component
-from orchestrator.devices.fmi.isolated_component_worker import Worker
+from orchestrator.devices.fmi.isolated_component_worker import Worker, prepare
 from orchestrator.devices.fmi.loaded_component import LoadedComponent
 from orchestrator.devices.fmi.port_mapping import BoundDescription, PortMap, without_binding
 from orchestrator.devices.sandbox.mailbox import DIED, Served
@@ -72,6 +73,8 @@ class Host(Worker):
     """Answers for several instances, each under a number."""
 
     def __init__(self, request: dict[str, Any]) -> None:
+        if request["clock_shift"]:
+            shift_clock(request["clock_shift"])
         super().__init__(request)
         self._table = (Served * _MOST)()
         self._instances: dict[int, Component] = {}
@@ -133,6 +136,9 @@ class Host(Worker):
     def _elsewhere(self) -> bool:
         """Return whether the FMU's code runs in a process under Wine, and nothing of it is seen in this one."""
         return runs_under_wine(without_binding(self._description))
+
+
+__all__ = ["main", "prepare"]
 
 
 def main(request: dict[str, Any]) -> None:

@@ -163,7 +163,7 @@ class FMU2Tolerant(FMU2Slave):  # type: ignore[misc]
     def _loadFunctions(self) -> None:
         for name in self._absent_functions:
             setattr(self.dll, name, _Absent(lambda name=name: self._refuse_call(name)))  # type: ignore[misc]
-        for name, told in _prototypes().items():
+        for name, told in prototypes().items():
             function = getattr(self.dll, name)
             function.argnames, function.argtypes = told.argnames, told.argtypes
             function.restype = told.restype
@@ -178,7 +178,7 @@ class _Library:
 
 
 @cache
-def _prototypes() -> dict[str, SimpleNamespace]:
+def prototypes() -> dict[str, SimpleNamespace]:
     """Names and types of the arguments, and type of the result, of each of fmpy's functions.
 
     Fmpy reads them from its own methods anew for each instance, which is a third of what opening one takes."""

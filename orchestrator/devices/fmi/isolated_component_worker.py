@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.core.errors import ComponentError, CosimError, UnsupportedFmuError
+from orchestrator.devices.fmi.binary import prototypes
 from orchestrator.devices.fmi.component import Component
 from orchestrator.devices.fmi.description import FmuDescription, read_description
 from orchestrator.devices.fmi.instance import compile_adapters
@@ -150,6 +151,11 @@ class Worker:
 
     def do_deserialize_state(self, content: str) -> int:
         return self._keep_state(self._instance().deserialize_state(bytes.fromhex(content)))
+
+
+def prepare() -> None:
+    """Do what all workers do alike, in the process of which they are copies."""
+    prototypes()
 
 
 def main(request: dict[str, Any]) -> None:

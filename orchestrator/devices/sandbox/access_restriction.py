@@ -185,7 +185,7 @@ def confine_alone(work: Path, readable: Iterable[Path], *, windows: bool = False
     InputError
         If a library brought a second thread before: Landlock would not bind it.
     """
-    if sys.platform == "linux" and _has_threads():
+    if sys.platform == "linux" and has_threads():
         raise InputError(
             "the process for a DLL had a second thread before it closed itself off, so the DLL was not loaded; "
             "what Python imports at its start (sitecustomize, usercustomize, a .pth file) may begin no thread"
@@ -193,7 +193,8 @@ def confine_alone(work: Path, readable: Iterable[Path], *, windows: bool = False
     confine(Means(), LAYERS, work, readable, windows=windows)
 
 
-def _has_threads() -> bool:
+def has_threads() -> bool:
+    """Return whether this process has a second thread."""
     return len(os.listdir("/proc/self/task")) > 1
 
 
@@ -209,7 +210,7 @@ def _tried(wanted: bool, means: Callable[[], None]) -> str:
 
 
 def _restrict(means: Means, work: Path, readable: Iterable[Path], more: Sequence[Path]) -> None:
-    if _has_threads():
+    if has_threads():
         raise OSError(0, "there is a second thread already")
     proc = ["/proc"] if means.own_processes else list(_OF_THE_KERNEL)
     own = [Path("/dev/shm")] if means.read_only else []

@@ -10,11 +10,12 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from fmus.toolchain.temporary import own_folder, remove
 from orchestrator.devices.sandbox import wine
 from orchestrator.devices.sandbox.access_restriction import LAYERS
+from orchestrator.devices.sandbox.copied_process import CopiedProcess, start_copy
 from orchestrator.devices.sandbox.mailbox import Mailbox, mailbox_library, shared_memory
 from orchestrator.devices.sandbox.passed_environment import environment
 from orchestrator.devices.sandbox.process_end import ProcessFault, fault_of_exit, last_line
@@ -25,6 +26,35 @@ from orchestrator.devices.sandbox.resource_limits import Limits
 # time in which a supervisor ends all that it watches over [s]; then it is ended itself
 _PATIENCE = 5.0
 _LOOK = 0.01  # time [s] after which it is looked whether a process has ended
+
+
+def _started(
+    told: Mapping[str, Any], output: IO[bytes], variables: Mapping[str, str]
+) -> "subprocess.Popen[bytes] | CopiedProcess":
+    """The supervisor: a copy of one that was prepared, or, where there is none, a new program.
+
+    Wine's server is started in the process before it is closed, as that of a program of its own."""
+    copied = (
+        None if told["windows"] else start_copy(told["worker"], told, variables, output.fileno())
+    )
+    if copied is not None:
+        return copied
+    memory = told["mailbox"]
+    return subprocess.Popen(
+        [
+            sys.executable,
+            "-P",
+            "-m",
+            "orchestrator.devices.sandbox.supervisor",
+            json.dumps(told),
+        ],
+        stdin=subprocess.PIPE,
+        stdout=output,
+        stderr=output,
+        start_new_session=True,
+        env=variables,
+        pass_fds=(memory,) if isinstance(memory, int) else (),
+    )
 
 
 class ConfinedProcess:
@@ -65,21 +95,7 @@ class ConfinedProcess:
                 "windows": windows,
             }
             with (self.folder / "output").open("ab") as output:
-                self._process = subprocess.Popen(
-                    [
-                        sys.executable,
-                        "-P",
-                        "-m",
-                        "orchestrator.devices.sandbox.supervisor",
-                        json.dumps(told),
-                    ],
-                    stdin=subprocess.PIPE,
-                    stdout=output,
-                    stderr=output,
-                    start_new_session=True,
-                    env={**environment(), **(variables or {})},
-                    pass_fds=(memory,) if isinstance(memory, int) else (),
-                )
+                self._process = _started(told, output, {**environment(), **(variables or {})})
         except BaseException:
             remove(self.folder)
             raise
@@ -115,6 +131,7 @@ class ConfinedProcess:
         if not self.wait(_PATIENCE):
             self.end()
             return ProcessFault.TAMPERING, "it said that it ended, and had not"
+        assert self._process.returncode is not None
         return fault_of_exit(self._process.returncode, self._limits)
 
     def last_words(self) -> str:

@@ -5,7 +5,8 @@ the first process of the FMU's own process namespace, where there is one: with i
 did to hide. The *worker* alone has the FMU's code in it. An ordinary user makes namespaces together with a user
 namespace, which some systems and containers forbid: then there are none, and the other protections stand alone.
 
-No library but Python's own is imported here: the worker closes itself off before numpy brings threads."""
+No library but Python's own is imported here: the worker closes itself off before numpy brings threads. A supervisor
+that is a copy of a template (`template`) has numpy already, and has no threads."""
 
 import contextlib
 import importlib
