@@ -185,8 +185,18 @@ def check_xml(path: Path, name: str, text: bytes) -> None:
         ) from error
 
 
-_checked_before = lru_cache(maxsize=32)(check_xml)
-"""For the newest documents that were in order: a study reads its device's file for every point."""
+def _checked_before(path: Path, name: str, text: bytes) -> None:
+    """The same of a document that may have been in order before, there or as a copy elsewhere."""
+    try:
+        _of_content(text)
+    except FmuFileError:
+        check_xml(path, name, text)  # whose error names the file
+
+
+@lru_cache(maxsize=32)
+def _of_content(text: bytes) -> None:
+    """For the newest documents that were in order: a study reads its device's file for every point."""
+    check_xml(Path(), "", text)
 
 
 @contextmanager

@@ -259,8 +259,20 @@ def parse_description(path: Path, text: bytes, names: Sequence[str] = ()) -> Fmu
     return replace(described, has_backslashes=any("\\" in name for name in names))
 
 
-# the newest descriptions by all that they are made of: a study reads its device's file for every point
-_parsed_before = lru_cache(maxsize=32)(parse_description)
+@lru_cache(maxsize=32)
+def _parsed_before(path: Path, text: bytes, names: Sequence[str]) -> FmuDescription:
+    """The same of a file that may have been read before, there or as a copy elsewhere."""
+    try:
+        found = _of_content(text, names)
+    except FmuFileError:
+        return parse_description(path, text, names)  # whose error names the file
+    return replace(found, path=path)
+
+
+@lru_cache(maxsize=32)
+def _of_content(text: bytes, names: Sequence[str]) -> FmuDescription:
+    """The newest descriptions by what they are made of: a study reads its device's file for every point."""
+    return parse_description(Path(), text, names)
 
 
 def _only(text: bytes, names: Sequence[str] = ()) -> BytesIO:

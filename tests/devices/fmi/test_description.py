@@ -1,7 +1,9 @@
 """Reading an FMU's file: everything it declares, and every way in which a file can be unusable."""
 
 import re
+import shutil
 import zipfile
+from dataclasses import replace
 
 import fmpy
 import pytest
@@ -364,7 +366,7 @@ def test_names_and_texts_that_steer_a_terminal_are_written_out(rewritten, capsys
 
 
 def test_a_description_is_judged_once_and_again_where_it_changed(rewritten, monkeypatch):
-    """A study reads its device's file for every point."""
+    """A study reads its device's file for every point, and a certificate a copy of it."""
     path = rewritten(lambda text: text.replace("<fmiModelDescription", "<fmiModelDescription ", 1))
     first = read_declared(path)
 
@@ -374,5 +376,7 @@ def test_a_description_is_judged_once_and_again_where_it_changed(rewritten, monk
     with monkeypatch.context() as patch:
         patch.setattr(archive.expat, "ParserCreate", parser)
         assert read_declared(path) is first
+        copy = read_declared(shutil.copy(path, path.with_name("copy.fmu")))
+    assert copy == replace(first, path=path.with_name("copy.fmu"))
     rewritten(lambda text: f"<!DOCTYPE x>{text.partition('?>')[2]}")
     refused(path, "document type")
