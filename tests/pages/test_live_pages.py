@@ -212,6 +212,45 @@ def test_two_lines_side_by_side_have_their_number_at_their_flow(window):
     assert odd == ["2 lines: 200 MW"]
 
 
+def test_a_saved_page_answers_what_most_ask_of_a_live_one(window):
+    """A line out, a converter apart, and the gain for 10 % were asked of the live page alone."""
+    path = ROOT / ".docs" / "live" / "kundur.html"
+    held = {one["question"]: one for one in saved(path)["asked"]}
+    view = window(viewport={"width": 1280, "height": 900})
+    view.goto(path.as_uri())
+    for question in ("What if line tie_7_8_1 is out?", "What does the converter do?"):
+        view.get_by_role("button", name=question).click()
+        (one,) = held[question]["answer"]["modes"]["scenarios"]
+        (least,) = one["modes"]
+        figures = f"{least['frequency_hz']:.3f} Hz with {least['damping_percent']:.2f} %"
+        said = view.inner_text("#else-said").replace("−", "-")
+        assert f"{held[question]['words']}: UNSTABLE, least damped {figures}. " in said
+        assert "least damped 0.622 Hz with -1.01 %" in said
+    view.evaluate("state.scenario = 'another'; paintQuestions();")
+    assert "What does the converter do?" not in view.inner_text("#questions")
+
+
+def test_a_saved_page_tells_between_which_values_a_gain_gives_the_wanted_damping(window):
+    view = window(viewport={"width": 1280, "height": 900})
+    view.goto((ROOT / ".docs" / "live" / "ieee39.html").as_uri())
+    view.get_by_role("button", name="Which gain gfor38.pod_p.K gives 10 %?").click()
+    said = view.inner_text("#else-said")
+    value, damping = r"([\d.]+)", r"\(([\d.]+) %\)"
+    found = re.search(
+        f"comes to 10 % between {value} {damping} and {value} {damping}, which are", said
+    )
+    low, less, high, more = map(float, found.groups())
+    assert low < high
+    assert less < 10 <= more
+    view.evaluate(
+        "SAVED.grid['gfor38.pod_p.K'] = SAVED.grid['gfor38.pod_p.K'].filter(x => x < 52.4)"
+    )
+    view.evaluate("askGain('gfor38.pod_p.K')")
+    said = view.inner_text("#else-said")
+    assert said.startswith("None of the ")
+    assert said.endswith(f" gives 10 %: the most has {low:g} ({less:.2f} %).")
+
+
 MARKS = """
 Array.from(document.querySelectorAll("#network circle.unit, #network path.load"), x => {
   const {left, top, right, bottom} = x.getBoundingClientRect();

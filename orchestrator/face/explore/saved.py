@@ -15,6 +15,7 @@ from orchestrator.core.bisection import halve_towards
 from orchestrator.core.errors import CosimError, InputError
 from orchestrator.core.safe_files import check_page, write_text
 from orchestrator.face.api.case import Case
+from orchestrator.face.explore.asked_before import answered_questions
 from orchestrator.face.explore.files import whole_page
 from orchestrator.face.explore.interpolation import cells_of, corners_of, judged_cell
 from orchestrator.face.explore.movers import grid_of
@@ -65,6 +66,7 @@ def save_page(
     for plan in plans:
         held.compute(plan)
     opened = desk.answer({"ask": "open"}, _nobody)
+    asked_before = answers_to_questions(desk, beginning, opened)
     shown = [_shown_of(plan, held.answers) for plan in plans]
     content = {
         "beginning": beginning,
@@ -73,11 +75,27 @@ def save_page(
         "flows": held.flows,
         "answers": held.answers,
         "cells": held.cells,
+        "asked": asked_before,
         **shown[0],
     }
     if further:
         content["others"] = dict(zip(further, shown[1:], strict=True))
     write_text(path, whole_page(content))
+
+
+def answers_to_questions(
+    desk: Desk, beginning: Mapping[str, Any], opened: Mapping[str, Any]
+) -> list[dict[str, Any]]:
+    """Return the questions of the live page that a saved page answers as well, with their answers."""
+    asked = {"range": beginning["range"]}
+
+    def computed(scenario: str, values: Mapping[str, Any]) -> dict[str, Any]:
+        of = {**asked, "ask": "modes", "scenario": scenario, "values": dict(values)}
+        return desk.answer(of, _nobody)
+
+    of_scenario = {"ask": "parameters", "scenario": beginning["scenario"], **asked}
+    shown = desk.answer(of_scenario, _nobody)
+    return answered_questions(beginning, shown, opened, computed)
 
 
 @dataclass(frozen=True)

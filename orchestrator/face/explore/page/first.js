@@ -197,6 +197,8 @@ function paintQuestions() {
     const on = (state.values[off] ?? original(off)) !== false;
     add(`What does ${off.replace(/\.enabled$/, "")} do?${none}`, () => withValues({ [off]: !on }, `${off} = ${!on}`));
   }
+  for (const one of SAVED ? askedBefore() : []) add(one.question, () => sayAskedBefore(one));
+  if (SAVED && gain && SAVED.grid[gain.parameter]) add(`Which gain ${gain.parameter} gives ${WANTED_DAMPING} %?`, () => askGain(gain.parameter));
   if (SAVED?.others) add("Which scenario damps most?", askBestScenario);
   const sliders = Object.keys(SAVED?.grid ?? {}), doubled = sliders.filter(isDoubled), twice = doubled.find(name => name.endsWith(".K")) ?? doubled[0];
   if (twice) add(`What if ${twice} is doubled?`, () => askDoubled(twice));

@@ -100,6 +100,22 @@ function askBestScenario() {
   const others = sorted.slice(1, Math.min(4, sorted.length - 1)).map(one => `${titleOf(one)} ${fixed(leastDampingOf(one.answer), 2)} %`);
   sayElse(`Of ${tried.length} scenarios at these values, ${titleOf(sorted[0])} damps most: ${swingOf(sorted[0].answer)}; ${others.length ? `then ${others.join(", ")}; ` : ""}least does ${titleOf(sorted.at(-1))}, ${fixed(leastDampingOf(sorted.at(-1).answer), 2)} %. `, show);
 }
+// What was asked when the page was written: of the scenario with which it begins, at the case's values.
+const askedBefore = () => (SAVED.beginning.scenario === state.scenario ? SAVED.asked ?? [] : []);
+function sayAskedBefore(one) {
+  const differ = one.other ? ` They differ by ${differencesOf(one.other, state.scenario).join(", ")}.` : "";
+  sayElse(one.answer ? `At the case's values. ${one.words}: ${swingOf(one.answer)}. ${titleNow()}: ${swingOf(one.now)}.${differ}` : `${one.words}: ${one.reason}`);
+}
+// Between which computed values of a gain the least damped mode comes to the wanted damping.
+function askGain(name) {
+  const tried = SAVED.grid[name].map(value => ({ value, answer: answerWith(name, value) })).filter(one => one.answer && leastOf(one.answer.modes.scenarios[0].modes));
+  const has = one => leastDampingOf(one.answer) >= WANTED_DAMPING, told = one => `${number(one.value)} (${fixed(leastDampingOf(one.answer), 2)} %)`;
+  const sorted = [...tried].sort((one, other) => leastDampingOf(other.answer) - leastDampingOf(one.answer)), between = [];
+  for (let k = 1; k < tried.length; k++) if (has(tried[k]) !== has(tried[k - 1])) between.push(`${told(tried[k - 1])} and ${told(tried[k])}`);
+  const range = `the ${tried.length} computed values of ${name} from ${number(tried[0].value)} to ${number(tried.at(-1).value)}`;
+  if (!between.length) { sayElse(has(tried[0]) ? `All of ${range} give ${WANTED_DAMPING} % or more.` : `None of ${range} gives ${WANTED_DAMPING} %: the most has ${told(sorted[0])}.`); return; }
+  sayElse(`The least damped mode comes to ${WANTED_DAMPING} % between ${between.join(", and between ")}, which are neighbours among ${range}.`);
+}
 // At which of some values the system is stable: the fewer ones are named.
 function stabilityOf(tried) {
   const [stable, unstable] = [true, false].map(verdict => tried.filter(one => one.answer.modes.scenarios[0].stable === verdict).map(one => number(one.value)));
