@@ -202,8 +202,16 @@ class OpenLoops:
         return whole
 
     def _at(self, closing: _Closing) -> tuple[Vector, Vector, Vector]:
-        used = closing.used
-        return self.U[:, used], self.V[used], self.D[np.ix_(used, used)]
+        used = tuple(closing.used)
+        if used not in self._parts:
+            rows = list(used)
+            self._parts[used] = self.U[:, rows], self.V[rows], self.D[np.ix_(rows, rows)]
+        return self._parts[used]
+
+    @cached_property
+    def _parts(self) -> dict[tuple[int, ...], tuple[Vector, Vector, Vector]]:
+        """U, V and D of the loops that are closed: a search closes the same ones thousands of times."""
+        return {}
 
     def _turned(self, closing: _Closing) -> tuple[Vector, Vector]:
         """Matrices of what acts in the place of the signals, by the states x and by those of the stages."""
