@@ -1,6 +1,7 @@
 """Every FMU reproduces its folder's reference trajectory under FMPy, somebody else's importer."""
 
 import csv
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -35,14 +36,20 @@ def test_fmu_reproduces_its_reference_trajectory(reference, internal_step, fmu_p
     assert error[jump + 5 :].max() < LATER[internal_step]
 
 
+@lru_cache(maxsize=4)
+def opened(path):
+    """An FMU's description and the folder with its files, for all that is simulated with it."""
+    return read_model_description(str(path)), extract(str(path))
+
+
 def simulate(path, reference, columns, rows, internal_step):
     """A plain co-simulation loop with held inputs: set, read what follows directly, step."""
-    description = read_model_description(str(path))
+    description, folder = opened(path)
     references = {v.name: v.valueReference for v in description.modelVariables}
     types = {v.name: v.type for v in description.modelVariables}
     fmu = FMU2Slave(
         guid=description.guid,
-        unzipDirectory=extract(str(path)),
+        unzipDirectory=folder,
         modelIdentifier=description.coSimulation.modelIdentifier,
         instanceName=reference.model,
     )
