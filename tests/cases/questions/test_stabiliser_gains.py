@@ -4,11 +4,13 @@ import re
 
 import numpy as np
 import pytest
-import scipy.signal
 
 from orchestrator.cases.case import load_case
 from tests.cases.networks.psse import raw
 from tests.cases.networks.psse.test_dyr import CASE, DYR
+from tests.support.late import LateLibrary
+
+signal = LateLibrary("scipy.signal")
 
 IEEEST = "1 'IEEEST' 1 1 0 {filter} {stages} 1.65 1.65 3 {limit} -{limit} 0 0 /\n"
 TYPICAL = "1.013 0.013 0 0 1.013 0.113"
@@ -34,7 +36,7 @@ def test_a_limit_that_the_least_change_reaches_is_asked_about_with_what_makes_th
     jump = 0.113 / 0.013 * 10 / 0.02 * 3
     above = np.polymul([0.113, 1.013, 1], np.polymul([10, 1], [3 * 1.65, 0]))
     below = np.polymul([0.013, 1.013, 1], np.polymul([0.02, 1], [1.65, 1]))
-    swing = abs(scipy.signal.freqs(above, below, [2 * np.pi])[1][0])
+    swing = abs(signal.freqs(above, below, [2 * np.pi])[1][0])
     assert (
         f"by 13038 (K_S = 3, leads of the filter = 8.692, T_1/T_2 = 500): one of {0.1 / jump:.2g} pu reaches the limit"
         in text
