@@ -195,7 +195,7 @@ def write_dll(
     code = dll_source(chosen.model, sample_time)
     for number, platform in enumerate(platforms, 1):
         report(
-            f"{name}: compiling for {platform} ({number} of {len(platforms)}); minutes where it was never compiled"
+            f"{name}: compiling for {platform} ({number} of {len(platforms)}); longer where it was never compiled"
         )
         target, ending = DLL_TARGETS[platform]
         built[platform] = (f"{name}{ending}", compile_for(code, target, ending).read_bytes())

@@ -3,15 +3,17 @@
 A released wheel brings the orchestrator's own libraries for every platform in the folder ``prebuilt``, so that running
 FMUs needs no compiler."""
 
+import os
 import re
 import struct
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
+from fmus.toolchain import windows
 from fmus.toolchain.cache import cache_directory, intact, keep, key_of
 from fmus.toolchain.extras import installed_version, require
 from fmus.toolchain.temporary import own_folder, remove, sweep_partial_files
@@ -150,20 +152,28 @@ def compile_for(source: str, target: str, ending: str, libraries: Sequence[str] 
     try:
         (folder / _SOURCE).write_text(source, encoding="utf-8")
         built = folder / f"library{ending}"
-        for command in _commands(target, ending, libraries, built):
-            result = subprocess.run(
-                [str(_zig()), *command], capture_output=True, text=True, check=False, cwd=folder
-            )
-            if result.returncode == 0:
+        for way in _ways(target, ending, libraries, built):
+            said = _run(way, folder)
+            if said is None:
                 return keep(library, built.read_bytes())
-        raise RuntimeError(
-            f"the C compiler (ziglang) failed for {target}:\n{result.stderr.strip()}"
-        )
+        raise RuntimeError(f"the C compiler (ziglang) failed for {target}:\n{said}")
     finally:
         remove(folder)
 
 
+def _run(commands: Sequence[Sequence[str]], folder: Path) -> str | None:
+    """Run zig's commands one after the other in a folder; return what the first that fails says."""
+    for command in commands:
+        result = subprocess.run(
+            [str(_zig()), *command], capture_output=True, text=True, check=False, cwd=folder
+        )
+        if result.returncode != 0:
+            return result.stderr.strip()
+    return None
+
+
 _SOURCE = "source.c"  # what messages of the compiler name
+_OBJECT = "source.obj"
 
 _WITHOUT_RUNTIME = (
     *("-fno-compiler-rt", "-z", "defs"),  # a call of the runtime library is an error at once
@@ -171,24 +181,53 @@ _WITHOUT_RUNTIME = (
 )
 
 
-def _commands(target: str, ending: str, libraries: Sequence[str], built: Path) -> list[list[str]]:
-    """Return arguments of zig, to be tried one after the other; each that succeeds writes the same bytes.
+def _ways(
+    target: str, ending: str, libraries: Sequence[str], built: Path
+) -> Iterator[list[list[str]]]:
+    """Yield ways to make a library, to be tried one after the other: commands of zig; each way that succeeds writes the
+    same bytes.
 
-    Of a library for Linux, zig first makes it without its own runtime library, which it compiles once in each new
-    environment, for 4 s of processor, and which our code calls nothing of. Code that does is compiled as all other."""
+    What zig brings as source, it compiles once in each new environment. So a library for Linux is first linked without
+    its runtime library (4 s of processor), which our code calls nothing of, and one for Windows with those files alone
+    of mingw's C library (100 s as a whole) that our code uses. Code that needs more is linked as all other."""
     linked = ["-lm", *(f"-l{name}" for name in libraries)]
     flags = _flags(target, ending)
-    driver = ["cc", "-target", target, *flags, _SOURCE, "-o", str(built), *linked]
-    if ending != ENDINGS["linux64"]:
-        return [driver]
     own = [flag for flag in flags if flag != "-shared"]
-    return [
-        [
-            *("build-lib", "-dynamic", "-target", target, *_WITHOUT_RUNTIME),
-            *("-lc", *linked, f"-femit-bin={built}", "-cflags", *own, "--", _SOURCE),
-        ],
-        driver,
-    ]
+    if ending == ENDINGS["linux64"]:
+        yield [
+            [
+                *("build-lib", "-dynamic", "-target", target, *_WITHOUT_RUNTIME),
+                *("-lc", *linked, f"-femit-bin={built}", "-cflags", *own, "--", _SOURCE),
+            ]
+        ]
+    runtime = [] if libraries else _windows_runtime(target, ending)
+    if runtime:
+        yield [
+            ["cc", "-target", target, *own, "-c", _SOURCE, "-o", _OBJECT],
+            windows.link_command(target, ending, _OBJECT, runtime, built),
+        ]
+    yield [["cc", "-target", target, *flags, _SOURCE, "-o", str(built), *linked]]
+
+
+def _windows_runtime(target: str, ending: str) -> list[Path]:
+    """Return what a library for Windows is linked with; nothing for another target or with another zig."""
+    if target not in windows.MACHINES or installed_version("ziglang") != windows.CHECKED_ZIG:
+        return []
+    key = key_of(target, ending, *recipe(), *windows.RUNTIME_RECIPE)
+    names = windows.runtime_files(ending)
+    kept = [cache_directory("libraries") / key / name for name in names]
+    if all(intact(path) for path in kept):
+        return kept
+    folder = own_folder("compile")
+    try:
+        sources = Path(os.environ.get("ZIG_LIB_DIR") or _zig().with_name("lib"))
+        if _run(windows.runtime_commands(target, ending, sources, folder), folder) is not None:
+            return []
+        return [
+            keep(path, (folder / name).read_bytes()) for path, name in zip(kept, names, strict=True)
+        ]
+    finally:
+        remove(folder)
 
 
 @cache

@@ -89,7 +89,8 @@ def _routes(routes: Sequence[Route], model: Model) -> str:
 
 _C = Path(__file__).with_name("c")
 _TOOLCHAIN = Path(__file__).parents[1] / "toolchain" / "c"
-_HEADERS = "#define _GNU_SOURCE\n" + "".join(
+# For Windows it would mean mingw's own functions of text, which `fmus.toolchain.windows` does without.
+_HEADERS = "#ifndef _WIN32\n#define _GNU_SOURCE\n#endif\n" + "".join(
     f"#include <{name}.h>\n" for name in ("math", "stdarg", "stdint", "stdio", "stdlib", "string")
 )
 
