@@ -11,7 +11,8 @@ import sys
 import threading
 import time
 from collections.abc import Mapping
-from typing import IO, Any
+from pathlib import Path
+from typing import IO, Any, ClassVar
 
 from orchestrator.devices.sandbox.kernel_calls import on_known_machine
 from orchestrator.devices.sandbox.resource_limits import TO_BEGIN
@@ -20,17 +21,55 @@ _LOOK = 0.05  # longest time [s] after which it is looked whether a process has 
 _SHORTEST_LOOK = 0.0005  # the first such time [s]
 _PATIENCE = 5.0  # time for a template to end once nobody can ask it any more [s]
 _LONGEST_NUMBER = 20  # digits of a process's number
-_MOST = 4  # templates at the same time: each environment has one
+_MOST = 4  # templates at the same time: one for each environment and standing
+_INHERITED_STATUS = (
+    *("Umask:", "Uid:", "Gid:", "Groups:", "SigBlk:", "SigIgn:", "Cap", "NoNewPrivs:"),
+    *("Seccomp", "Cpus_allowed:", "Mems_allowed:"),
+)
+"""How the lines of /proc/PID/status begin that a program has from the process that starts it."""
+_INHERITED_FILES = ("limits", "oom_score_adj", "cgroup")
+"""Files of /proc/PID with more of that."""
+
+
+def standing() -> tuple[str, ...]:
+    """Return rights, limits, priority and namespaces that a program has which this process starts now.
+
+    A template that began with another standing is not copied, or an FMU would have what gfor has given up. A
+    restriction by Landlock alone cannot be seen: an ordinary user's comes with NoNewPrivs, which can."""
+    own, spaces = Path("/proc/thread-self"), Path("/proc/self/ns")
+    status = (own / "status").read_text(encoding="utf-8").splitlines()
+    lines = [line for line in status if line.startswith(_INHERITED_STATUS)]
+    files = [(own / name).read_text(encoding="utf-8") for name in _INHERITED_FILES]
+    namespaces = sorted(os.readlink(link) for link in spaces.iterdir())
+    turn = f"{os.getpriority(os.PRIO_PROCESS, 0)} {os.sched_getscheduler(0)}"
+    return (*lines, *files, *namespaces, turn)
 
 
 class CopiedProcess:
     """A child of this process; the same as `subprocess.Popen` where it has the same names."""
+
+    _forgotten: ClassVar[list[int]] = []
+    """Numbers of processes for whose end nobody waits any more."""
 
     def __init__(self, pid: int, given: int) -> None:
         self.pid = pid
         self.returncode: int | None = None
         self.stdin: IO[bytes] | None = os.fdopen(given, "wb", buffering=0)
         self._asking = threading.Lock()
+        self._reap_forgotten()
+
+    def __del__(self) -> None:
+        if self.returncode is None:
+            self._forgotten.append(self.pid)
+
+    @classmethod
+    def _reap_forgotten(cls) -> None:
+        """Take leave of those that have ended, as `subprocess` does."""
+        for process in tuple(cls._forgotten):
+            with contextlib.suppress(ChildProcessError):  # somebody else has
+                if os.waitpid(process, os.WNOHANG) == (0, 0):
+                    continue
+            cls._forgotten.remove(process)
 
     def poll(self) -> int | None:
         with self._asking:
@@ -109,17 +148,23 @@ class _Template:
             self.process.wait()
 
 
+_Key = tuple[frozenset[tuple[str, str]], tuple[str, ...]]
+
+
 class _Templates:
-    """Those of this process, by the variables of their environment."""
+    """Those of this process, by the variables of their environment and the standing with which they began."""
 
     def __init__(self) -> None:
         self._asking = threading.Lock()
-        self._found: dict[frozenset[tuple[str, str]], _Template] = {}
-        self._useless: set[frozenset[tuple[str, str]]] = set()
+        self._found: dict[_Key, _Template] = {}
+        self._useless: set[_Key] = set()
 
     def copy(self, worker: str, environment: Mapping[str, str], handles: list[int]) -> int:
         """Number of a new process; 0 where no template makes one."""
-        key = frozenset(environment.items())
+        try:
+            key = frozenset(environment.items()), standing()
+        except OSError:  # a container that hides /proc
+            return 0
         with self._asking:
             while key not in self._useless:
                 if key not in self._found:

@@ -39,7 +39,9 @@ class Open:
         if isinstance(message, JSONRPCRequest):
             self._ids.add(message.id)
         elif isinstance(message, JSONRPCNotification) and message.method == _CANCELLED:
-            self._close((message.params or {}).get("requestId"))
+            cancelled = (message.params or {}).get("requestId")
+            if isinstance(cancelled, int | str):
+                self._close(cancelled)
 
     def went(self, message: Any) -> None:
         """Take a message of the server."""
@@ -53,8 +55,9 @@ class Open:
                 self._changed = anyio.Event()
                 await self._changed.wait()
 
-    def _close(self, one: Any) -> None:
-        self._ids.discard(one)
+    def _close(self, one: int | str | None) -> None:
+        if one is not None:
+            self._ids.discard(one)
         self._changed.set()
 
 

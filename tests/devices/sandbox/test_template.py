@@ -1,10 +1,13 @@
 """Processes of foreign FMUs that are copies of a template: they have no more than a program of their own has."""
 
+import gc
 import os
 import re
+import resource
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -48,7 +51,7 @@ def of(process, name):
 
 def status(process):
     """What stands in a process's status under some names, which are the same for all that are alike."""
-    names = r"Uid|Gid|Groups|NoNewPrivs|Seccomp|Seccomp_filters|Cap\w+|Sig(?:Blk|Ign)"
+    names = r"Uid|Gid|Groups|Umask|Cpus_allowed|NoNewPrivs|Seccomp|Seccomp_filters|Cap\w+|Sig(?:Blk|Ign)"
     return re.findall(rf"^(?:{names}):.*$", of(process, "status"), re.M)
 
 
@@ -109,14 +112,65 @@ def test_copies_are_children_of_gfor_in_sessions_of_their_own(fmu):
 
 
 def test_a_copy_has_what_a_program_of_its_own_has(fmu, monkeypatch):
+    copied_and_alone(fmu, monkeypatch)
+
+
+def copied_and_alone(fmu, monkeypatch):
+    """What a copy has of the machine and of gfor, held against what a program of its own has."""
     with IsolatedComponent("a", fmu) as component:
         assert isinstance(component._process._process, copied_process.CopiedProcess)
         copied = seen(component)
-    monkeypatch.setattr(foreign_process, "start_copy", lambda *_: None)
-    with IsolatedComponent("a", fmu) as component:
-        assert isinstance(component._process._process, subprocess.Popen)
-        alone = seen(component)
-    assert copied == alone
+    with monkeypatch.context() as patch:
+        patch.setattr(foreign_process, "start_copy", lambda *_: None)
+        with IsolatedComponent("a", fmu) as component:
+            assert isinstance(component._process._process, subprocess.Popen)
+            assert copied == seen(component)
+    return copied
+
+
+@pytest.fixture
+def after_it_narrowed_itself():
+    """gfor gives up something that a template which had begun before still has, for the time of a test."""
+    files, processors = resource.getrlimit(resource.RLIMIT_NOFILE), os.sched_getaffinity(0)
+    mask, interrupt = os.umask(0), signal.getsignal(signal.SIGINT)
+
+    def narrow():
+        os.umask(0o077)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (min(200, files[0]), files[1]))
+        os.sched_setaffinity(0, {min(processors)})
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    os.umask(mask)
+    yield narrow
+    os.umask(mask)
+    resource.setrlimit(resource.RLIMIT_NOFILE, files)
+    os.sched_setaffinity(0, processors)
+    signal.signal(signal.SIGINT, interrupt)
+    end_templates()
+
+
+def test_what_gfor_gives_up_the_next_fmu_does_not_have(fmu, monkeypatch, after_it_narrowed_itself):
+    before = copied_and_alone(fmu, monkeypatch)
+    after_it_narrowed_itself()
+    assert before != copied_and_alone(fmu, monkeypatch)
+
+
+def test_a_component_that_was_dropped_leaves_no_process(fmu):
+    dropped = IsolatedComponent("a", fmu)
+    process = supervisor(dropped)
+    dropped._process._process.stdin.close()  # as the end of the object does
+    wait_until(lambda: "State:\tZ" in of(process, "status"))
+    del dropped
+    gc.collect()
+    with IsolatedComponent("b", fmu):
+        assert not Path(f"/proc/{process}").exists()
+
+
+def wait_until(reached):
+    end = time.monotonic() + 10.0
+    while not reached():
+        assert time.monotonic() < end
+        time.sleep(0.01)
 
 
 def test_the_template_knows_nothing_of_an_fmu(fmu):

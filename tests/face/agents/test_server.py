@@ -66,7 +66,8 @@ def answers(tmp_path_factory):
 
 
 def test_the_end_of_the_input_leaves_no_question_unanswered(tmp_path):
-    """Who wrote questions into a pipe got no answer to the last one; a line that is no JSON was dropped."""
+    """Who wrote questions into a pipe got no answer to the last one; a line that is no JSON was dropped, and a
+    cancellation without an id ended the server."""
     asked = [
         {
             "id": 1,
@@ -78,6 +79,7 @@ def test_the_end_of_the_input_leaves_no_question_unanswered(tmp_path):
             },
         },
         {"method": "notifications/initialized"},
+        {"method": "notifications/cancelled", "params": {"requestId": {"no": "id"}}},
         {"id": 2, "method": "tools/call", "params": {"name": "scr", "arguments": {"case": "no"}}},
         {
             "id": 3,
