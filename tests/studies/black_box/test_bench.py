@@ -149,3 +149,59 @@ def test_steps_begin_at_their_times_each_behind_its_inputs(refused, told):
     else:
         assert (status, tuple(failed)) == (3, told)
         assert calls == [*each[0], *each[1][:2]]
+
+
+STEP_STACK = ctypes.CFUNCTYPE(
+    ctypes.c_int,
+    ctypes.POINTER(ctypes.c_void_p),
+    ctypes.c_size_t,
+    ctypes.c_double,
+    ctypes.c_double,
+    ctypes.POINTER(ctypes.c_int),
+)
+
+
+def test_steps_side_by_side_begin_at_their_times_without_one_that_refused():
+    """Seven steps of 0.1 s were made before; the second component refuses the step from 0.8 s."""
+    inputs = [np.array([[1.0], [2.0], [3.0]]), np.array([[4.0], [5.0], [6.0]])]
+    outputs, h, given, steps = [np.zeros((3, 1)), np.zeros((3, 1))], 0.1, {}, []
+
+    def put(component, references, count, values):
+        given[component] = values[0]
+        return 0
+
+    def step(components, count, time, size, status):
+        steps.append(([components[k] for k in range(count)], round(time, 9), size))
+        for k in range(count):
+            status[k] = 3 * (components[k] == 2 and round(time, 9) == 0.8)
+        return 0
+
+    def read(component, references, count, values):
+        values[0] = given[component] + 0.5
+        return 0
+
+    put, step, read = GET_SET(put), STEP_STACK(step), GET_SET(read)
+    references = (ctypes.c_uint32 * 2)(7, 9)
+    asked = (Steps * 2)(
+        *(
+            Steps(
+                input_references=ctypes.addressof(references),
+                output_references=ctypes.addressof(references) + ctypes.sizeof(ctypes.c_uint32),
+                n_in=1,
+                n_out=1,
+                inputs=own.ctypes.data,
+                outputs=found.ctypes.data,
+                index=7,
+                count=3,
+                step_size=h,
+            )
+            for own, found in zip(inputs, outputs, strict=True)
+        )
+    )
+    components, refused = (ctypes.c_void_p * 2)(1, 2), (ctypes.c_int * 2)()
+    functions = [ctypes.cast(one, ctypes.c_void_p) for one in (put, read, step)]
+    bench._library().drive_beside(components, *functions, ctypes.byref(asked), 2, refused)
+    assert steps == [([1, 2], 0.7, h), ([1, 2], 0.8, h), ([1], 0.9, h)]
+    assert outputs[0].ravel().tolist() == [1.5, 2.5, 3.5]
+    assert outputs[1].ravel().tolist() == [4.5, 0.0, 0.0]
+    assert list(refused) == [0, 3]
