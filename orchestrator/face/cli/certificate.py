@@ -56,6 +56,7 @@ from orchestrator.studies.certification.kinds import (
 )
 from orchestrator.studies.certification.margins import margin_of, narrowest
 from orchestrator.studies.certification.matrix import BEHAVIOUR
+from orchestrator.studies.certification.report_criteria import remarks_on
 from orchestrator.studies.certification.request import STUDY, rated_frequency
 from orchestrator.studies.certification.signed import sign_folder
 from orchestrator.studies.certification.verdict import FAILS, INCOMPLETE, exit_code
@@ -75,6 +76,8 @@ def show(found: Certificate, files: Sequence[Path], folder: Path, console: Conso
         said += f" Not as the code has it: {', '.join(found.departures)}."
     console.print(f"[bold {colour}]{escape(said)}[/]", soft_wrap=True)
     if isinstance(found, DampingCertificate):
+        for remark, where in remarks_on(found):
+            console.print(escape(f"{remark}; {where}."), soft_wrap=True, highlight=False)
         _show_damping_test(found, console)
     else:
         console.print(_verdicts(found), "")

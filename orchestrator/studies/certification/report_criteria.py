@@ -1,6 +1,6 @@
 """The two criteria on a certificate's page: every mode, and every response with the norm's construction."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from html import escape
 
 import numpy as np
@@ -331,16 +331,24 @@ def _time_cells(time: TimeVerdict | None) -> list[str]:
 
 
 def _remark(c: Certificate) -> Iterator[str]:
+    for remark, where in remarks_on(c, damping):
+        yield f"<b>{remark}</b>; {where}"
+
+
+def remarks_on(
+    c: Certificate, in_words: Callable[[float], str] = lambda percent: number(percent, 2)
+) -> Iterator[tuple[str, str]]:
+    """Yield each remark on a verdict, and where it shows; ``in_words`` writes a damping [%]."""
     lowered = [(m, v.X_L) for v in c.verdicts for m in v.lowered]
     if lowered:
         worst, X_L = min(lowered, key=lambda entry: entry[0].damping_percent)
         places = ", ".join(f"{X:g}" for X in dict.fromkeys(X for _, X in lowered))
         change = (
-            f"from {number(worst.before_percent or 0.0, 2)} to {damping(worst.damping_percent)} %"
+            f"from {number(worst.before_percent or 0.0, 2)} to {in_words(worst.damping_percent)} %"
         )
         yield (
-            f"<b>Remark: the converter lowers a damping by more than {LOWERED:g} points at X_L = {places} pu</b>; "
-            f"the lowest of them at {X_L:g} pu and {worst.frequency_hz:.3f} Hz, {change}"
+            f"Remark: the converter lowers a damping by more than {LOWERED:g} points at X_L = {places} pu",
+            f"the lowest of them at {X_L:g} pu and {worst.frequency_hz:.3f} Hz, {change}",
         )
 
 

@@ -4,6 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from orchestrator.face.cli import certificate
+from orchestrator.face.cli.terminal import make_console
 from orchestrator.studies.certification import report_criteria
 
 
@@ -53,3 +55,26 @@ def test_the_findings_name_where_each_criterion_is_not_accepted(monkeypatch):
     text = "\n".join(report_criteria.damping_findings(c))
     assert "Eigenvalue criterion: not accepted at X_L = 0.3 pu" in text
     assert "not accepted at X_L = 0.2, 0.3 pu" in text
+
+
+def test_the_terminal_says_the_remark_of_the_page(monkeypatch, capsys, tmp_path):
+    mode = SimpleNamespace(before_percent=25.33, damping_percent=4.0, frequency_hz=0.5)
+    found = SimpleNamespace(
+        verdicts=[SimpleNamespace(X_L=0.1, lowered=[mode])],
+        verdict="incomplete",
+        sentence=lambda: "It is accepted where it was judged.",
+        is_by_rows=False,
+        passed=False,
+        refused=False,
+    )
+    remark = "Remark: the converter lowers a damping by more than 2 points at X_L = 0.1 pu"
+    where = "the lowest of them at 0.1 pu and 0.500 Hz, from 25.33 to"
+    (on_page,) = report_criteria._remark(found)
+    assert on_page == f'<b>{remark}</b>; {where} <span class="bad">4.00</span> %'
+    monkeypatch.setattr(certificate, "DampingCertificate", SimpleNamespace)
+    monkeypatch.setattr(certificate, "_show_damping_test", lambda *_: None)
+    certificate.show(found, [], tmp_path, make_console())
+    assert f"judged.\n{remark}; {where} 4.00 %.\n" in capsys.readouterr().out
+    found.verdicts[0].lowered = []
+    certificate.show(found, [], tmp_path, make_console())
+    assert "Remark" not in capsys.readouterr().out
