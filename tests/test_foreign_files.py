@@ -136,6 +136,7 @@ OWN = {
     "cases.form.definition": "is_file before it",
     "cases.networks.psse.dyr_model_list": "our own table",
     "devices.acceptance.controller_dll.file_head": "is_file before it",
+    "devices.sandbox.copied_process": "/proc",
     "devices.sandbox.dll_process_worker": "the library that this process is started for",
     "cases.networks.psse.missing_models": "our own table",
     "cases.networks.kept_tables": "the cache and our own tables",

@@ -2,7 +2,10 @@
 
 import contextlib
 import json
+import subprocess
 import sys
+import time
+from pathlib import Path
 
 import pytest
 
@@ -15,6 +18,8 @@ from orchestrator.devices.fmi import vendor_files
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.fmi.vendor_files import as_fmu
 from orchestrator.devices.sandbox.dll_process import DllNotLoadedError, DllProcess
+from orchestrator.devices.sandbox.process_tree import descendants
+from tests.devices.sandbox.test_sandbox import all_end
 from tests.support.vendor_dlls import compiled, lag
 
 SLOW = lag(begin="usleep(1500000);", head="\n#include <unistd.h>\n")
@@ -242,3 +247,42 @@ def test_no_dll_is_loaded_by_a_process_that_had_a_second_thread_before(tmp_path,
         read_dll(library, vendor_files.READER)
     with pytest.raises(DllNotLoadedError, match="second thread before it closed itself off"):
         DllProcess(library)
+
+
+_READING = """
+import sys
+from pathlib import Path
+from orchestrator.devices.fmi.vendor_files import as_fmu
+as_fmu(Path(sys.argv[1]))
+"""
+_HOLDING = """
+import sys
+from pathlib import Path
+from orchestrator.devices.sandbox.dll_process import DllProcess
+held = DllProcess(Path(sys.argv[1]))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the kernel ends it, Linux's alone")
+@pytest.mark.parametrize("script", [_READING, _HOLDING])
+def test_nothing_outlives_gfor_that_is_killed_while_a_dll_hangs(script, tmp_path):
+    never = (
+        "__attribute__((constructor)) static void hang(void) { for (volatile int go = 1; go;) {} }"
+    )
+    library = compiled(lag(head=f"\n{never}\n"), tmp_path)
+    with subprocess.Popen([sys.executable, "-c", script, str(library)]) as gfor:
+        holder = process_with(library, gfor.pid)
+        gfor.kill()
+    assert all_end([holder])
+
+
+def process_with(library, begin):
+    """The process below another one that has loaded a library."""
+    end = time.monotonic() + 60.0
+    while time.monotonic() < end:
+        for process in descendants(begin):
+            with contextlib.suppress(OSError):
+                if str(library) in Path(f"/proc/{process}/maps").read_text(encoding="utf-8"):
+                    return process
+        time.sleep(0.02)
+    raise AssertionError("no process loaded the library")

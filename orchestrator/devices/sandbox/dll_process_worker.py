@@ -18,6 +18,7 @@ from fmus.vendor_dll.reading import read_interface
 from orchestrator.core.errors import InputError
 from orchestrator.devices.sandbox import wine
 from orchestrator.devices.sandbox.access_restriction import confine_alone
+from orchestrator.devices.sandbox.kernel_calls import end_with_starter
 from orchestrator.devices.sandbox.resource_limits import Limits, apply_limits
 
 PAGE = 4096  # the smallest page of the machines that are known [bytes]
@@ -210,5 +211,6 @@ def serve(library: Path, folder: Path, texts: list[str]) -> None:
 
 
 if __name__ == "__main__":
+    end_with_starter()  # it sees that nobody asks any more only where the DLL comes back
     serve(Path(sys.argv[1]), Path(sys.argv[2]), json.loads(sys.argv[3]))
     os._exit(0)  # what a DLL registered for the end of the process is of no use to anyone

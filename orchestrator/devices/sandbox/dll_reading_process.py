@@ -12,6 +12,7 @@ from orchestrator.core.errors import InputError
 from orchestrator.devices.sandbox import wine
 from orchestrator.devices.sandbox.access_restriction import confine_alone
 from orchestrator.devices.sandbox.compiled_programs import compile_programs
+from orchestrator.devices.sandbox.kernel_calls import end_with_starter
 
 
 def _files(texts: dict[str, str] | None) -> list[Path]:
@@ -42,6 +43,7 @@ def _read_under_wine(library: Path, answer: Path, texts: dict[str, str] | None) 
 
 
 if __name__ == "__main__":
+    end_with_starter()  # a DLL that never comes back would run for ever once gfor was killed
     given, found = Path(sys.argv[1]), Path(sys.argv[2])
     read = (
         _read_under_wine if sys.platform == "linux" and given.read_bytes()[:2] == b"MZ" else _read

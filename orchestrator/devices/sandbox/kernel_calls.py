@@ -88,6 +88,12 @@ def die_with_parent(number: int) -> None:
     libc().prctl(_DIES_WITH_PARENT, ctypes.c_ulong(number), 0, 0, 0)
 
 
+def end_with_starter() -> None:
+    """Have this process ended by the kernel where the thread that started it ends, which waits for it; on Linux."""
+    if sys.platform == "linux":
+        die_with_parent(signal.SIGKILL)
+
+
 def adopt_orphans() -> bool:
     """Become the parent of every descendant whose own parent ends."""
     return sys.platform == "linux" and not libc().prctl(_SUBREAPER, ctypes.c_ulong(1), 0, 0, 0)
