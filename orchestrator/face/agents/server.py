@@ -20,7 +20,7 @@ from orchestrator.face.agents.streams import Incoming, Open, Outgoing
 from orchestrator.face.agents.verbs import VERBS, Verbs
 
 _TIMES = 2.0  # a question may wait as long for its turn as it may take
-_TOLD_EVERY = 5.0  # [s] after which a client hears again that its question is worked on
+_TOLD_EVERY = 5.0  # [s] after which a client hears again of its question
 _SHOWN = 40  # characters of an unknown argument's name that an error repeats
 
 _P = ParamSpec("_P")
@@ -58,7 +58,7 @@ class VerbServer(MCPServer[Any]):
     """A server that refuses an argument which a verb has not, instead of an answer as if it were not given.
 
     Once its input has ended, it answers what was asked until then, within ``patience`` [s]. A question takes at most
-    ``seconds`` [s]; a client that asks for it hears meanwhile that it is worked on."""
+    ``seconds`` [s]; a client that asks for it hears meanwhile how long ago it was asked."""
 
     seconds = 0.0
     patience = 0.0
@@ -99,15 +99,13 @@ class VerbServer(MCPServer[Any]):
             telling.cancel()
 
     async def _tell_progress(self, verb: str, context: Context[Any, Any] | None) -> None:
-        """Tell again and again for how long a question has been worked on, until it is answered."""
+        """Tell again and again how long ago a question was asked, until it is answered."""
         begin = time.monotonic()
+        limit = f"it may wait {self.seconds:g} s for its turn, and then take {self.seconds:g} s"
         while context is not None:
             await asyncio.sleep(_TOLD_EVERY)
             since = time.monotonic() - begin
-            limit = f"it may take {self.seconds:g} s, and wait as long for its turn"
-            await context.report_progress(
-                since, None, f"{verb}: at work for {since:.0f} s; {limit}"
-            )
+            await context.report_progress(since, None, f"{verb}: asked {since:.0f} s ago; {limit}")
 
 
 def _check_names(verb: str, given: dict[str, Any], schema: dict[str, Any]) -> None:

@@ -1,6 +1,7 @@
 """``gfor fmu check``: acceptance tests of an FMU."""
 
 import argparse
+from collections import Counter
 from dataclasses import replace
 
 from rich.console import Console
@@ -100,6 +101,8 @@ def _print(report: AcceptanceReport) -> None:
     lacking = missing(report.protections)
     if lacking:
         console.print(f"Not in force on this system: {', '.join(lacking)}.")
+    counts = Counter(str(result.verdict) for result in report.results)
+    console.print(", ".join(f"{verdict} {count}" for verdict, count in counts.items()) + ".")
     colour = "bold red" if report.failures else "bold yellow"
     style = "" if report.trusted else colour
     console.print(escape(f"{report.fmu.name}: {report.sentence}"), style=style)

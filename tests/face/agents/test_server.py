@@ -143,7 +143,7 @@ def test_a_long_question_tells_its_progress_and_others_are_answered_meanwhile(
     assert "no answer within 7 s" in found["long"].content[0].text
     seconds, text = told[0]
     assert 0 < seconds < 60
-    assert text == "modes: at work for 0 s; it may take 7 s, and wait as long for its turn"
+    assert text == "modes: asked 0 s ago; it may wait 7 s for its turn, and then take 7 s"
 
 
 def test_every_verb_only_reads_and_has_a_schema_with_units(answers):
