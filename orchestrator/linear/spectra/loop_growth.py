@@ -11,9 +11,9 @@ from itertools import pairwise
 
 import numpy as np
 import scipy.linalg
-import scipy.optimize
 
 from orchestrator.core.arrays import Complex, Matrix, Vector
+from orchestrator.core.late import optimize
 from orchestrator.core.threads import one_thread
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.changed_spectra import Change, ends_in_states
@@ -112,7 +112,7 @@ class LoopGrowth:
 
         # at the ends themselves, which the small system gives, the whole one may be on the same side
         if side(low) * side(high) < 0:
-            scipy.optimize.brentq(side, low, high, xtol=_CROSSING * low, rtol=_CROSSING)
+            optimize.brentq(side, low, high, xtol=_CROSSING * low, rtol=_CROSSING)
         return min(seen.items(), key=lambda one: abs(one[1].imag))
 
 

@@ -7,7 +7,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[3]
-HEAVY = {"dask", "h5py", "matplotlib", "pandapower", "pandas", "pint", "xarray"}
+HEAVY = {
+    *("dask", "h5py", "matplotlib", "pandapower", "pandas", "pint", "xarray"),
+    *("scipy.optimize", "scipy.signal", "scipy.stats"),
+}
 PARTS = {"numpy.f2py.f2py2e", "numpy.testing._private.utils", "unittest"}
 USED = "numpy.testing.assert_array_equal([1], [1]); assert numpy.f2py.f2py2e.run_main"
 
