@@ -98,6 +98,22 @@ def test_a_device_that_emits_a_line_is_told_apart_from_one_that_is_not_yet_at_re
         run._come_to_rest()
 
 
+def three_steps(references, inputs, outputs, step_size, **more):
+    """Steps behind seven that were made: one input, whose reference comes first, and one output."""
+    return Steps(
+        input_references=ctypes.addressof(references),
+        output_references=ctypes.addressof(references) + ctypes.sizeof(ctypes.c_uint32),
+        n_in=1,
+        n_out=1,
+        inputs=inputs.ctypes.data,
+        outputs=outputs.ctypes.data,
+        index=7,
+        count=3,
+        step_size=step_size,
+        **more,
+    )
+
+
 @pytest.mark.parametrize(("refused", "told"), [(0.0, None), (0.8, (1, CALLED_STEP))])
 def test_steps_begin_at_their_times_each_behind_its_inputs(refused, told):
     """Seven steps of 0.1 s were made before; the functions are an FMU's, which may refuse the step from 0.8 s."""
@@ -119,18 +135,7 @@ def test_steps_begin_at_their_times_each_behind_its_inputs(refused, told):
 
     put, step, read = GET_SET(put), DO_STEP(step), GET_SET(read)
     references = (ctypes.c_uint32 * 2)(7, 9)
-    asked = Steps(
-        input_references=ctypes.addressof(references),
-        output_references=ctypes.addressof(references) + ctypes.sizeof(ctypes.c_uint32),
-        n_in=1,
-        n_out=1,
-        inputs=inputs.ctypes.data,
-        late=late.ctypes.data,
-        outputs=outputs.ctypes.data,
-        index=7,
-        count=3,
-        step_size=h,
-    )
+    asked = three_steps(references, inputs, outputs, h, late=late.ctypes.data)
     functions = [ctypes.cast(one, ctypes.c_void_p) for one in (put, read, step)]
     status = bench._library().drive(None, *functions, ctypes.byref(asked), failed)
     each = [
@@ -184,17 +189,7 @@ def test_steps_side_by_side_begin_at_their_times_without_one_that_refused():
     references = (ctypes.c_uint32 * 2)(7, 9)
     asked = (Steps * 2)(
         *(
-            Steps(
-                input_references=ctypes.addressof(references),
-                output_references=ctypes.addressof(references) + ctypes.sizeof(ctypes.c_uint32),
-                n_in=1,
-                n_out=1,
-                inputs=own.ctypes.data,
-                outputs=found.ctypes.data,
-                index=7,
-                count=3,
-                step_size=h,
-            )
+            three_steps(references, own, found, h)
             for own, found in zip(inputs, outputs, strict=True)
         )
     )
