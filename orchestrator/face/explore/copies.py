@@ -13,6 +13,9 @@ import socket
 import subprocess
 import sys
 import threading
+import time
+import weakref
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import IO
@@ -29,36 +32,52 @@ class Copy:
 
     def __init__(self, line: socket.socket, stdin: IO[str], stdout: IO[str]) -> None:
         self._line, self.stdin, self.stdout = line, stdin, stdout
-        self._told = threading.Lock()
+        self._reading = threading.Lock()
         self._pid = 0
         self.returncode: int | None = None
+        weakref.finalize(self, line.close)  # not sooner: a thread may wait at it
 
     @property
     def pid(self) -> int:
-        """Its number, for which the first one who asks waits until the imports are done."""
-        with self._told:
-            self._hear_number(None)
-            return self._pid
+        """Its number; who asks waits until the imports are done."""
+        self._wait_until(lambda: self._pid != 0, None)
+        return self._pid
 
     @property
     def is_there(self) -> bool:
         """Say whether the imports were done, so that it can be told to end without a wait."""
-        with self._told:
-            self._hear_number(0.0)
-            return self._pid != 0
+        self._read_what_came()
+        return self._pid != 0
 
-    def _hear_number(self, timeout: float | None) -> None:
-        if not self._pid and select.select([self._line], [], [], timeout)[0]:
-            self._pid = int(self._line.recv(_NUMBER) or b"-1")
+    def _wait_until(self, is_known: Callable[[], bool], timeout: float | None) -> None:
+        """Wait for what the line tells; nobody else is kept from reading it meanwhile."""
+        end = None if timeout is None else time.monotonic() + timeout
+        while True:
+            self._read_what_came()
+            left = None if end is None else end - time.monotonic()
+            if is_known() or (left is not None and left <= 0.0):
+                return
+            select.select([self._line], [], [], left)
+
+    def _read_what_came(self) -> None:
+        """Take the number, and after it the code of the end, as far as they were told."""
+        with self._reading:
+            while self.returncode is None and select.select([self._line], [], [], 0.0)[0]:
+                told = self._line.recv(_NUMBER)
+                if self._pid == 0:
+                    self._pid = int(told or b"-1")
+                else:
+                    self.returncode = int(told or _UNKNOWN)
 
     def poll(self) -> int | None:
-        return self._looked(0.0)
+        self._read_what_came()
+        return self.returncode
 
     def wait(self, timeout: float | None = None) -> int:
-        code = self._looked(timeout)
-        if code is None:
+        self._wait_until(lambda: self.returncode is not None, timeout)
+        if self.returncode is None:
             raise subprocess.TimeoutExpired("gfor explore", timeout or 0.0)
-        return code
+        return self.returncode
 
     def terminate(self) -> None:
         self._send(signal.SIGTERM)
@@ -70,15 +89,6 @@ class Copy:
         if self.poll() is None and self.pid > 0:
             with suppress(ProcessLookupError):
                 os.kill(self.pid, number)
-
-    def _looked(self, timeout: float | None) -> int | None:
-        with self._told:
-            if self.returncode is None:
-                self._hear_number(timeout)
-                if self._pid and select.select([self._line], [], [], timeout)[0]:
-                    self.returncode = int(self._line.recv(_NUMBER) or _UNKNOWN)
-                    self._line.close()
-            return self.returncode
 
 
 Process = subprocess.Popen[str] | Copy

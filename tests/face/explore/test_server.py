@@ -328,14 +328,18 @@ def test_a_process_that_is_cancelled_before_it_has_begun_ends(computing):
     assert "answer" in answer(computing)
     original, found = copies._original._process.pid, Computing("two_area")
     os.kill(original, signal.SIGSTOP)  # as if it were at its imports
-    at_work = in_background(found, number=1)
+    at_work = in_background(answer, found, number=1)
     wait_until(lambda: found._process is not None)
     begun = found._process
+    assert not begun.is_there
+    waiting = [in_background(begun.wait), in_background(lambda: begun.pid)]
+    time.sleep(0.1)  # until both wait
     found.cancel("p", 2)
     assert begun.poll() is None
     os.kill(original, signal.SIGCONT)
     assert at_work() == {"cancelled": True}
     assert begun.wait(30) != 0
+    assert [one() for one in waiting] == [begun.returncode, begun.pid]
     found.close()
 
 
@@ -371,12 +375,12 @@ def test_a_cancel_as_a_question_begins_ends_it(computing, monkeypatch, running):
 def test_a_hanging_process_is_ended_by_the_user(computing):
     assert "answer" in answer(computing)
     os.kill(computing._process.pid, signal.SIGSTOP)
-    at_work = in_background(computing, ask="parameters", number=1)
+    at_work = in_background(answer, computing, ask="parameters", number=1)
     wait_until(lambda: computing._at_work is not None)
-    waiting = in_background(computing, number=2)
+    waiting = in_background(answer, computing, number=2)
     wait_until(lambda: ("p", "modes") in computing._newest)
     computing.cancel("p", 4)
-    overtaken = in_background(computing, number=3)
+    overtaken = in_background(answer, computing, number=3)
     assert at_work() == waiting() == overtaken() == {"cancelled": True}
     assert "answer" in answer(computing, number=5)
 
@@ -401,7 +405,7 @@ def test_of_several_questions_of_a_page_the_last_one_wins(computing):
     asked = []
     for length in (0.21, 0.22, 0.23):
         before = computing._newest.get(("p", "modes"))
-        asked.append(in_background(computing, values={"grid.X_L": length}))
+        asked.append(in_background(answer, computing, values={"grid.X_L": length}))
         wait_until(lambda before=before: computing._newest.get(("p", "modes")) != before)
     os.kill(process, signal.SIGCONT)
     first, second, third = asked
@@ -411,20 +415,19 @@ def test_of_several_questions_of_a_page_the_last_one_wins(computing):
 
 @pytest.mark.slow
 def test_two_pages_do_not_disturb_each_other(computing):
-    first = in_background(computing, page="one", values={"grid.X_L": 0.21})
-    second = in_background(computing, page="two", values={"grid.X_L": 0.22})
+    first = in_background(answer, computing, page="one", values={"grid.X_L": 0.21})
+    second = in_background(answer, computing, page="two", values={"grid.X_L": 0.22})
     assert "grid.X_L=0.21" in first()["answer"]["copied"]["command"]
     assert "grid.X_L=0.22" in second()["answer"]["copied"]["command"]
 
 
 class in_background:  # noqa: N801 - reads as what it does
-    """A question in a thread of its own; a call gives its answer."""
+    """A function in a thread of its own; a call gives what it returned."""
 
-    def __init__(self, computing, **more):
+    def __init__(self, function, *arguments, **more):
         self._found = []
-        self._computing = computing
         self._thread = threading.Thread(
-            target=lambda: self._found.append(answer(computing, **more)), daemon=True
+            target=lambda: self._found.append(function(*arguments, **more)), daemon=True
         )
         self._thread.start()
 
