@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import islice
 
 import numpy as np
 import scipy.linalg
@@ -28,6 +29,13 @@ guarded."""
 HIGHEST_SWING_HZ = 5.0
 """Frequency [Hz] up to which electromechanical modes outside of a range are named: small machines beside large ones."""
 
+LOCAL_HZ = 3.0
+"""Frequency [Hz] up to which single machines swing against the network (Kundur 1994, section 12.8, has 2 Hz for large
+ones; small ones have been seen at 2.9 Hz). Above the range they are told of, and not followed."""
+
+_TOLD = 2
+"""Components that are told with a mode, those that take part most."""
+
 # A multiplier of the step map smaller than this decays within one step and is not a mode
 _DEAD = 1e-9
 # up to this number of states, all eigenvectors are computed: they take no time that anyone notices
@@ -46,6 +54,19 @@ def damping_ratio(eigenvalue: complex) -> float:
 def damping_percent(eigenvalue: complex) -> float:
     """The damping ratio in percent, rounded once; 100·ζ may differ from it in the last digit."""
     return -100 * eigenvalue.real / abs(eigenvalue) if eigenvalue else 0.0
+
+
+def mode_in_words(eigenvalue: complex, shares: Iterable[tuple[str, float]]) -> str:
+    """Return frequency, damping and who takes part most: ``2.034 Hz, 5.19 % (sg3 0.86, sg2 0.12)``.
+
+    ``shares``: participation by component, largest first."""
+    hertz = eigenvalue.imag / (2 * np.pi)
+    return f"{hertz:.3f} Hz, {damping_percent(eigenvalue):.2f} % ({shares_in_words(shares)})"
+
+
+def shares_in_words(shares: Iterable[tuple[str, float]]) -> str:
+    """Return the components that take part most: ``sg3 0.86, sg2 0.12``."""
+    return ", ".join(f"{name} {share:.2f}" for name, share in islice(shares, _TOLD))
 
 
 class OfEigenvalue:

@@ -6,6 +6,7 @@ destabilise a stable system, and a long communication step may damp a mode that 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.critical_modes import nearest_pairs
 from orchestrator.linear.spectra.growth_search import find_growing_modes
 from orchestrator.linear.spectra.modes import (
+    LOCAL_HZ,
     ZERO,
     Mode,
     Spectrum,
@@ -74,6 +76,7 @@ class Hidden:
     least_damped: complex | None
     electromechanical: tuple[complex, ...] = ()
     rated_hz: float | None = None
+    who: tuple[str, ...] = ()  # the components that take part most in each of those
 
     def sentence(self, *, remedy: bool = True) -> str:
         low, high = self.frequency_range
@@ -87,8 +90,8 @@ class Hidden:
         if not self.electromechanical:
             return text
         shown = [
-            f"{z.imag / (2 * np.pi):.4g} Hz, {damping_percent(z):.2f} %"
-            for z in self.electromechanical
+            f"{z.imag / (2 * np.pi):.3f} Hz, {damping_percent(z):.2f} %{f' ({who})' * bool(who)}"
+            for z, who in zip_longest(self.electromechanical, self.who)
         ]
         text += f"; electromechanical: {few(shown, _SWINGS_SHOWN, '; ')}"
         return (f"{text}: show them by " + Option.RANGE + f" {self.wide}") if remedy else text
@@ -100,7 +103,8 @@ class Hidden:
         if not self.electromechanical:
             return f"{low:g}:{high:g}"
         highest = max(z.imag for z in self.electromechanical) / (2 * np.pi)
-        return f"{min(low, self._lowest_swing):.2g}:{max(high, np.ceil(10 * highest) / 10):g}"
+        above = LOCAL_HZ if highest <= LOCAL_HZ else np.ceil(10 * highest) / 10
+        return f"{min(low, self._lowest_swing):.2g}:{above if highest > high else high:g}"
 
     @property
     def least_swing(self) -> complex | None:
@@ -408,7 +412,7 @@ def judge(
         own = replace(own, zeros=continuous.zeros)
     own = replace(own, of_zeros=continuous.of_zeros if own.zeros > 1 else ())
     if own.stable is False and continuous.stable is not None and _only_slow(spectrum, own):
-        slow = f"slow eigenvalues, up to {SLOW:g} rad/s, are those without a communication step"
+        slow = f"eigenvalues of up to {SLOW:g} rad/s are those without a communication step"
         return replace(
             continuous, step_size=own.step_size, continuous_growth_rate=rate, reason=slow
         )

@@ -451,10 +451,11 @@ class Linearised:
         if spectrum is not None:
             eigenvalues = spectrum.eigenvalues.tolist()
             beyond = [mode for mode in oscillating if not low <= mode.frequency_hz <= high]
-            swings = [mode.eigenvalue for mode in beyond if is_swing(mode, analysis.swing)]
+            swings = [mode for mode in beyond if is_swing(mode, analysis.swing)]
             outside = replace(
                 hidden(spectrum.eigenvalues, low, high),
-                electromechanical=tuple(swings),
+                electromechanical=tuple(mode.eigenvalue for mode in swings),
+                who=tuple(spectra.shares_in_words(mode.by_component.items()) for mode in swings),
                 rated_hz=rated_hz,
             )
         fit_errors = {

@@ -16,6 +16,7 @@ from orchestrator.linear.spectra.growth_search import SLOWEST, find_growing_mode
 from orchestrator.linear.spectra.mode_refinement import RefinedModes, misses_modes, refine
 from orchestrator.linear.spectra.mode_tracking import ModeSet
 from orchestrator.linear.spectra.modes import (
+    LOCAL_HZ,
     ZERO,
     Mode,
     damping_ratio,
@@ -35,10 +36,6 @@ already."""
 MOST_COUNTED = 4000
 """Up to this number of states, all eigenvalues are computed where growth is counted (5 s of processor time with 3,049
 states), and where modes are found anew (7 s, and a search for the critical ones takes 17 s)."""
-
-LOCAL_HZ = 3.0
-"""Frequency [Hz] up to which single machines swing against the network (Kundur 1994, section 12.8, has 2 Hz for large
-ones; small ones have been seen at 2.9 Hz). Above the range they are told of, and not followed."""
 
 _BESIDE_ZERO = 1e-2
 """Place [rad/s] beside 0 whose nearest eigenvalues are sought: those that are zero or grow slowly are among them."""

@@ -18,6 +18,7 @@ from orchestrator.linear.models.linearization import Blocks
 from orchestrator.linear.models.slope_linearization import gives_slopes
 from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.linear.spectra.mode_tracking import ModeSet, match
+from orchestrator.linear.spectra.modes import shares_in_words
 from orchestrator.studies.modes.modes import modes_from
 from orchestrator.studies.operating_points.bench import DRIVEN, OBSERVED, PointBench
 from orchestrator.studies.operating_points.item import Item, Status
@@ -361,7 +362,7 @@ class _Worker:
         if above is None:
             return replace(record, looked_above=found.looked_above)
         value = (above.eigenvalue.real, above.eigenvalue.imag)
-        who = next(iter(above.by_component))
+        who = shares_in_words(above.by_component.items())
         return replace(record, looked_above=found.looked_above, above=value, who_above=who)
 
     def _own_eigenvalues(self, whole: Mapping[str, Any]) -> Any:

@@ -12,6 +12,7 @@ from orchestrator.core.errors import few
 from orchestrator.core.options import Option, command
 from orchestrator.core.spelling import Text
 from orchestrator.linear.spectra.critical_modes import DENSE
+from orchestrator.linear.spectra.modes import LOCAL_HZ, mode_in_words
 from orchestrator.linear.spectra.shifted_equations import GROWING
 from orchestrator.linear.spectra.stability import drift_in_words, zeros_in_words
 from orchestrator.output.report.verdict_sentence import VerdictSentence
@@ -22,7 +23,7 @@ from orchestrator.studies.operating_points.point_columns import Elements
 from orchestrator.studies.operating_points.points_file import OperatingCase
 from orchestrator.studies.operating_points.widening import widest
 from orchestrator.studies.operating_points.words import ONE_ITEM, all_items, counted_items
-from orchestrator.studies.screening.modes import LOCAL_HZ, UNSTABLE
+from orchestrator.studies.screening.modes import UNSTABLE
 from orchestrator.studies.screening.record import ItemRecord
 from orchestrator.studies.screening.study import ScreenedItem, ScreeningPlan
 from orchestrator.studies.screening.summary import ModeAt, Summary, least_of, where
@@ -337,8 +338,8 @@ def above_the_range(summary: Summary) -> str:
     least = summary.least_above()
     if least is not None and least.damping < 100 * wanted.damping:
         return (
-            f"Not judged: above the range a machine swings at {least.frequency:.3f} Hz with {least.damping:.2f} %: "
-            f"{where(summary, least.item)} ({least.who}); {typed} holds it."
+            f"Not judged: above the range a machine swings: {where(summary, least.item)}: {least.frequency:.3f} Hz, "
+            f"{least.damping:.2f} % ({least.who}); {typed} holds it."
         )
     if all(one.record.looked_above for one in items) or not _has_machines(plan):
         return ""
@@ -402,8 +403,7 @@ def _least(item: ScreenedItem) -> str:
     one = least_of(item)
     parts = [outside] if outside else []
     if one is not None and (one.damping < 0 or not outside):
-        who = ", ".join(f"{name} {share:.2f}" for name, share in one.participation(2))
-        parts.insert(0, f"{one.frequency:.3f} Hz, {one.damping:.2f} % ({who})")
+        parts.insert(0, mode_in_words(one.value, one.participation()))
     return f": {', and '.join(parts)}" if parts else ""
 
 

@@ -24,7 +24,7 @@ from orchestrator.linear.models.linearization import Blocks, continuous, where_g
 from orchestrator.linear.models.periodic import model_of
 from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.linear.spectra.continuation import Eigenpair, pair_at, pairs_near
-from orchestrator.linear.spectra.modes import Mode
+from orchestrator.linear.spectra.modes import Mode, mode_in_words
 from orchestrator.output.report.short_texts import first_few
 from orchestrator.simulation.watch.limits import limits_that_act
 from orchestrator.studies.modes.modes import ModesResult, changed, modes_from
@@ -71,7 +71,9 @@ class Sensitivity:
     # ``stays`` or ``moves`` with the parameter; ``held`` where the derivative leaves it where it is
     operating_point: str
     doubts: tuple[str, ...] = ()  # why the figure may be wrong; empty if it is trusted
-    reason: str = ""
+    reason: str = (
+        ""  # why there is no derivative, or why it is 0: what the parameter acts through is off
+    )
 
     @property
     def frequency_per_unit(self) -> float | None:
@@ -205,7 +207,7 @@ def find_sensitivities(
     if patterns:
         about_mode += _idle(prepared, rows)
     warnings = _neighbour(found.model, chosen)
-    ordered = sorted(rows.values(), key=_place)
+    ordered = [_with_switch(prepared, row) for row in sorted(rows.values(), key=_place)]
     if warnings:
         ordered = [
             replace(x, doubts=(*x.doubts, "double eigenvalue")) if x.derivative else x
@@ -238,8 +240,8 @@ def _not_least(found: ModesResult, chosen: Mode) -> tuple[str, ...]:
     if least is chosen:
         return ()
     return (
-        f"the mode here is the first one that the case names; {least.frequency_hz:.3f} Hz is damped less, with "
-        f"{least.damping_percent:.2f} %: "
+        "the mode here is the first one that the case names; damped less is "
+        f"{mode_in_words(least.eigenvalue, least.by_component.items())}: "
         + Option.MODE
         + f" {CRITICAL} takes that one, as `gfor explore` does",
     )
@@ -258,6 +260,14 @@ def _idle(prepared: PreparedScenario, rows: Mapping[Parameter, Sensitivity]) -> 
     return tuple(
         f"{first_few(found, str)} cannot act: {why}" for why, found in names.items() if why
     )
+
+
+def _with_switch(prepared: PreparedScenario, row: Sensitivity) -> Sensitivity:
+    """A row of 0 that says what is off, if that is why its parameter moves nothing."""
+    if row.derivative != 0:
+        return row
+    why = why_idle(prepared.system, row.parameter.component, row.parameter.variable)
+    return replace(row, reason=f"cannot act: {why}") if why else row
 
 
 def _chosen(found: ModesResult, name: str | None) -> Mode:

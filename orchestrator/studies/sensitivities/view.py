@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder
+from orchestrator.linear.spectra.modes import mode_in_words
 from orchestrator.output.report.column_table import Column, ColumnTable
 from orchestrator.output.report.notebook import headline, page
 from orchestrator.output.results.file_writers import save_json, save_table
@@ -97,17 +100,18 @@ _TOLD = 3
 
 
 def name_of(result: SensitivityResult) -> str:
-    """Return a mode's name, frequency and damping."""
+    """Return a mode's name if it has one, its frequency and damping, and who takes part most."""
     mode = result.mode
-    name = result.modes.name_of(mode) or "critical"
-    return f"{name}, {mode.frequency_hz:.4f} Hz, {mode.damping_percent:.2f} %"
+    name = result.modes.name_of(mode)
+    told = mode_in_words(mode.eigenvalue, mode.by_component.items())
+    return f"{name}, {told}" if name else told
 
 
 def tell_most(result: SensitivityResult) -> str:
     """Tell what moves the damping most, and how the rows are ordered."""
     return (
-        f"{_most_of(result)}. The table is ordered by points per %, the largest first; values of 0, which have no "
-        "percent, come behind"
+        f"{_most_of(result)}. The table is ordered by points per %, the largest first; behind lines come values of 0, "
+        "which have no percent, what moves nothing, and what has no derivative"
     )
 
 
@@ -125,6 +129,7 @@ def sensitivity_table(result: SensitivityResult) -> ColumnTable[Sensitivity]:
     point = (
         "is held" if result.held else "moves with the value, which the figures include, or stays"
     )
+    notes = _notes(result.rows)
     title = (
         f"{result.modes.prepared.title}, {name_of(result)}: how it changes for one unit and for 1 % more of each "
         f"value. A point is one percent of damping, as from 5 % to 6 %. The operating point {point}"
@@ -168,10 +173,32 @@ def sensitivity_table(result: SensitivityResult) -> ColumnTable[Sensitivity]:
             Column("Operating point", lambda row: row.operating_point, name="operating_point"),
             Column("", lambda row: "; ".join(row.doubts), name="doubts"),
             Column("", lambda row: row.reason, name="reason"),
-            Column("Doubt", lambda row: row.reason or "; ".join(row.doubts), text=True),
+            Column("Remark", _remark, lambda text: notes.get(text, text), text=True),
         ),
         result.rows,
+        note="\n".join(f"{short.capitalize()}: {text}." for text, short in notes.items()),
+        part=_part_of_table,
     )
+
+
+def _remark(row: Sensitivity) -> str:
+    return row.reason or "; ".join(row.doubts)
+
+
+def _notes(rows: Sequence[Sensitivity]) -> dict[str, str]:
+    """Return what stands in the rows in the place of a remark that several of them have, and below the table once."""
+    times = Counter(filter(None, map(_remark, rows)))
+    repeated = [text for text, number in times.items() if number > 1]
+    return {text: f"note {k}" for k, text in enumerate(repeated, 1)}
+
+
+def _part_of_table(row: Sensitivity) -> str:
+    """Name the part of the table that a row is in: what moves the mode, what does not, and what is not known."""
+    if row.derivative is None:
+        return "not known"
+    if not row.derivative:
+        return "moves nothing"
+    return "in percent" if row.damping_per_percent is not None else "of values of 0"
 
 
 def rows_of(result: SensitivityResult) -> list[dict[str, Any]]:

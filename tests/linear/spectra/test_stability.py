@@ -243,7 +243,7 @@ def test_electromechanical_modes_outside_of_the_range_are_named_with_a_range_tha
     swings = (complex(-1.6, 2 * np.pi * 2.098), complex(-0.2, 2 * np.pi * 0.052))
     found = Hidden((0.1, 2.0), 7, complex(-1.0, 500.0), swings)
     assert found.sentence().endswith(
-        "electromechanical: 2.098 Hz, 12.05 %; 0.052 Hz, 52.21 %: show them by --range 0.052:2.1"
+        "electromechanical: 2.098 Hz, 12.05 %; 0.052 Hz, 52.21 %: show them by --range 0.052:3"
     )
     assert [m["frequency_hz"] for m in found.as_json()["electromechanical"]] == pytest.approx(
         [2.098, 0.052]

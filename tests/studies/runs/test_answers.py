@@ -285,7 +285,7 @@ def test_a_swing_outside_of_the_range_is_named_where_it_has_less_damping(damping
     text = outside([modes])
     assert named in text
     assert text.endswith("; --details tells of them.")
-    assert ("(`gfor modes 'my grid.toml' --range 0.1:2.3`)" in text) == (damping == -0.4)
+    assert ("(`gfor modes 'my grid.toml' --range 0.1:3`)" in text) == (damping == -0.4)
     assert "--details" not in outside([modes], details=True)
 
 

@@ -59,6 +59,7 @@ def test_of_a_sensitivity():
         eigenvalue=EIGENVALUE,
         frequency_hz=EIGENVALUE_JSON["frequency_hz"],
         damping_percent=EIGENVALUE_JSON["damping_percent"],
+        by_component={"gfor": 1.0},
     )
     modes = SimpleNamespace(name_of=lambda _: "", prepared=bare_scenario())
     (said,) = rows_of(SimpleNamespace(rows=[row], mode=mode, modes=modes, held=()))

@@ -13,10 +13,10 @@ from orchestrator.linear.spectra import mode_refinement
 from orchestrator.linear.spectra.critical_modes import DENSE, find_critical_modes
 from orchestrator.linear.spectra.mode_refinement import RefinedModes, misses_modes, refine
 from orchestrator.linear.spectra.mode_tracking import ModeSet
-from orchestrator.linear.spectra.modes import find_spectrum
+from orchestrator.linear.spectra.modes import LOCAL_HZ, find_spectrum
 from orchestrator.linear.spectra.shifted_equations import ShiftedEquations, count_growing
 from orchestrator.studies.modes.modes import running
-from orchestrator.studies.screening.modes import LOCAL_HZ, CriticalRegion, find_modes_here
+from orchestrator.studies.screening.modes import CriticalRegion, find_modes_here
 from tests.support.scenarios import prepare_one
 
 REGION = CriticalRegion(0.1, 2.0, 0.2)

@@ -319,7 +319,7 @@ def test_of_outages_that_grow_the_one_that_grows_fastest_is_the_worst():
         (
             True,
             (-0.01, 18.4),
-            "Not judged: above the range a machine swings at 2.928 Hz with 0.05 %: out, intact (sg1); "
+            "Not judged: above the range a machine swings: out, intact: 2.928 Hz, 0.05 % (sg1 0.86); "
             "--range 1:3 holds it.",
         ),
         (True, (-9.0, 18.4), ""),  # damped well
@@ -338,7 +338,7 @@ def test_the_least_damped_swing_above_the_range_is_told(screened, looked, above,
         replace(first, record=replace(first.record, looked_above=looked, above=better)),
         replace(
             second,
-            record=replace(second.record, looked_above=looked, above=above, who_above="sg1"),
+            record=replace(second.record, looked_above=looked, above=above, who_above="sg1 0.86"),
         ),
     )
     if above == (-9.0, 18.4):
@@ -359,7 +359,7 @@ def calm(screened, above, critical=(0,)):
         critical=critical,
         shares={"sg1": np.ones(1, dtype=np.float32)},
     )
-    records = (one, replace(one, above=above, who_above="sg1"))
+    records = (one, replace(one, above=above, who_above="sg1 0.86"))
     items = tuple(
         replace(item, record=record, trajectories=(0,))
         for item, record in zip(screened.items, records, strict=True)
@@ -374,13 +374,13 @@ def calm(screened, above, critical=(0,)):
             (-0.01, 18.4),
             (0,),
             "; least damped up to 2 Hz: in, intact: 1.500 Hz, 9.51 % (sg1 1.00), "
-            "and LESS above: out, intact: 2.928 Hz, 0.05 % (sg1)",
+            "and LESS above: out, intact: 2.928 Hz, 0.05 % (sg1 0.86)",
             "9.51; 2.93 Hz above the range: 0.05",
         ),
         (
             (-0.83, 13.5),
             (),
-            "; least damped, above 2 Hz: out, intact: 2.149 Hz, 6.14 % (sg1)",
+            "; least damped, above 2 Hz: out, intact: 2.149 Hz, 6.14 % (sg1 0.86)",
             "20; 2.15 Hz above the range: 6.14",
         ),
     ],

@@ -13,11 +13,13 @@ from fmus.toolchain.python_fmu import PythonFmu
 from fmus.toolchain.symbols import fabs, fmin, sin
 from orchestrator.core.errors import AnalysisError, ComponentError
 from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.linear.spectra.modes import Mode
 from orchestrator.studies.modes.modes import running
 from orchestrator.studies.operating_points import bench
 from orchestrator.studies.sensitivities import sensitivities
 from orchestrator.studies.sensitivities.parameters import Parameter
-from orchestrator.studies.sensitivities.sensitivities import _not_least
+from orchestrator.studies.sensitivities.sensitivities import Sensitivity, _not_least, _with_switch
+from orchestrator.studies.sensitivities.view import sensitivity_table
 
 # Perturbed over a step of 1 ms, λ is right to about 1e-7 rad/s; over 2 % of 0.6 or of 0.1 that is what is allowed here.
 K, C = 25.0, 0.6
@@ -193,12 +195,14 @@ def test_fmus_are_opened_once_and_again_only_after_one_failed(
 def test_a_mode_that_was_taken_for_its_name_is_told_where_another_is_damped_less():
     """The explorer takes the least damped mode, and orders other values first."""
     least, named = (
-        SimpleNamespace(is_oscillation=True, frequency_hz=hertz, damping_percent=percent)
-        for hertz, percent in ((1.53, 20.95), (0.86, 28.7))
+        SimpleNamespace(
+            is_oscillation=True, eigenvalue=eigenvalue, by_component={"sg1": 0.6, "sg2": 0.3}
+        )
+        for eigenvalue in (-2 + 9.6j, -1.6 + 5.4j)
     )
     both = SimpleNamespace(modes=[least, named])
     (told,) = _not_least(both, named)
-    assert "1.530 Hz is damped less, with 20.95 %" in told
+    assert "damped less is 1.528 Hz, 20.40 % (sg1 0.60, sg2 0.30)" in told
     assert "--mode critical" in told
     assert _not_least(both, least) == ()
 
@@ -319,3 +323,44 @@ def test_what_moves_by_no_more_than_rounding_stays(size, moved, stays, monkeypat
     monkeypatch.setattr(sensitivities, "_answer", lambda master, name: answers.pop(0))
     monkeypatch.setattr(sensitivities, "changed", lambda *_: nullcontext())
     assert sensitivities._stays(None, Parameter("a", "K", "pu", 2.0, tunable=True), 1) is stays
+
+
+def row_of(variable, derivative, reason=""):
+    of_part = Parameter("gfor", variable, unit="pu", value=2.0, tunable=True)
+    return Sensitivity(of_part, -1 + 8j, derivative, None, "moves", reason=reason)
+
+
+def test_a_row_of_0_says_what_is_off():
+    """Seven rows of 0 did not say that POD-Q was off."""
+    plan = SimpleNamespace(
+        description=SimpleNamespace(variables=("pod_q.enabled", "pod_q.T_W", "limit")),
+        number=lambda key: 0.0,
+        value=lambda key: False,
+    )
+    wired = SimpleNamespace(components={"gfor": plan}, connections=())
+    rows = [row_of("pod_q.T_W", 0j), row_of("limit", 0j), row_of("pod_q.T_W", 0.1j)]
+    told = [_with_switch(SimpleNamespace(system=wired), row).reason for row in rows]
+    assert told == ["cannot act: gfor.pod_q.enabled is false", "", ""]
+
+
+def test_a_remark_of_several_rows_stands_once_below_a_table_in_parts():
+    rows = (
+        row_of("K", 0.1j),
+        *(row_of(name, 0j, "POD-Q is off") for name in ("a", "b")),
+        row_of("c", None, "no steady state"),
+    )
+    mode = Mode(-1 + 8j, (("sg1.omega", 0.6), ("sg2.omega", 0.3)), {})
+    modes = SimpleNamespace(prepared=SimpleNamespace(title="Base"), name_of=lambda mode: "slow")
+    found = SimpleNamespace(rows=rows, mode=mode, modes=modes, held=False)
+    table = sensitivity_table(found)
+    assert table.title.startswith("Base, slow, 1.273 Hz, 12.40 % (sg1 0.60, sg2 0.30): ")
+    remark = table.columns[-1]
+    assert [remark.cell(row) for row in rows] == ["", "note 1", "note 1", "no steady state"]
+    assert table.note == "Note 1: POD-Q is off."
+    assert [table.part(row) for row in rows] == [
+        "in percent",
+        "moves nothing",
+        "moves nothing",
+        "not known",
+    ]
+    assert [record["reason"] for record in table.records()][1] == "POD-Q is off"  # whole in files
