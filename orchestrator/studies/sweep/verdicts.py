@@ -1,8 +1,10 @@
 """The verdict on every scenario of a sweep, in the words of the terminal, of files and of pages."""
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 
+from orchestrator.linear.spectra.modes import damping_percent, mode_in_words
 from orchestrator.output.report.verdict_sentence import VerdictSentence
 from orchestrator.studies.sweep.axes import Axis, grid_places
 from orchestrator.studies.sweep.sweep import ScenarioSweep, SweepResult
@@ -23,22 +25,43 @@ def verdicts(result: SweepResult) -> list[tuple[str, VerdictSentence]]:
 
 def _verdict(sweep: ScenarioSweep, axes: Sequence[Axis]) -> VerdictSentence:
     total = math.prod(len(axis.values) for axis in axes)
+    least = _least(sweep, axes)
     places, known = sweep.unstable(axes), sweep.counts(axes)
     rest = f" ({known[True]} stable, {known[None]} not known)" if known[None] else ""
     if places:
         worst = f"worst at {place_text(axes, places[0])}: {sweep.points[places[0]].because}"
-        at = f"at {len(places)} of {total} points{rest}; {worst}{_turns(sweep, axes)}"
+        at = f"at {len(places)} of {total} points{rest}{least}; {worst}{_turns(sweep, axes)}"
         return VerdictSentence(False, "UNSTABLE", at)
     if sweep.stable is False:
-        between = f"between two points of the grid{rest}; take more points"
+        between = f"between two points of the grid{rest}; take more points{least}"
         return VerdictSentence(False, "UNSTABLE", between)
     if known[None]:
-        counted = f"{known[None]} of {total} points have no verdict, {known[True]} are stable, 0 are unstable"
+        counted = f"{known[None]} of {total} points have no verdict, {known[True]} are stable, 0 are unstable{least}"
         return VerdictSentence(None, "not known", counted)
     if sweep.stable is None:
-        between = "a point between those of the grid has no verdict"
+        between = f"a point between those of the grid has no verdict{least}"
         return VerdictSentence(None, "not known", between)
-    return VerdictSentence(True, "stable", f"nothing grows at any of {total} points")
+    return VerdictSentence(True, "stable", f"nothing grows at any of {total} points{least}")
+
+
+def _least(sweep: ScenarioSweep, axes: Sequence[Axis]) -> str:
+    """The least damped mode of the range at all places of the grid, and where that is; "" without modes."""
+    found = [
+        (place, modes, k)
+        for place in grid_places(axes)
+        if (modes := sweep.points[place].modes) is not None
+        for k in range(len(modes.eigenvalues))
+    ]
+    if not found:
+        return ""
+    place, modes, k = min(
+        found, key=lambda one: damping_percent(complex(one[1].eigenvalues[one[2]]))
+    )
+    shares: Counter[str] = Counter()
+    for name, factor in zip(modes.names, modes.participation()[k], strict=True):
+        shares[name.partition(".")[0]] += float(factor)
+    told = mode_in_words(complex(modes.eigenvalues[k]), shares.most_common())
+    return f"; least damping at {place_text(axes, place)}: {told}"
 
 
 def _turns(sweep: ScenarioSweep, axes: Sequence[Axis]) -> str:

@@ -6,6 +6,7 @@ import re
 import shlex
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import xarray as xr
 from orchestrator.cases.case import Case, load_case
 from orchestrator.core.errors import ErrorKind, InputError
 from orchestrator.devices.fmi.description import VariableInfo
+from orchestrator.linear.spectra.mode_tracking import ModeSet
 from orchestrator.output.report.html.chapters.studies import of_sweep
 from orchestrator.studies.points.dask_cluster import DaskCluster
 from orchestrator.studies.points.executor import Serial
@@ -22,10 +24,11 @@ from orchestrator.studies.points.points import Work
 from orchestrator.studies.points.processes import Processes
 from orchestrator.studies.points.store import PointStore
 from orchestrator.studies.sweep import sweep as sweep_module
-from orchestrator.studies.sweep.axes import _axis, parse_vary, resolve
+from orchestrator.studies.sweep.axes import Axis, _axis, parse_vary, resolve
 from orchestrator.studies.sweep.point import PointRecord, compute_point
 from orchestrator.studies.sweep.request import SweepRequest
 from orchestrator.studies.sweep.sweep import ScenarioSweep, plan_sweep, run_sweep
+from orchestrator.studies.sweep.verdicts import _least
 from tests.studies.sweep.sweep_case import two_oscillators
 from tests.support.interruption import interrupted_after
 from tests.support.scenarios import prepare_one
@@ -541,7 +544,8 @@ def test_points_without_a_verdict_are_counted_and_warnings_are_said(
     arguments = ("--scenario", "one", "--workers", 1, "--out", out, "--vary")
     _, text, err = gfor(case, *arguments, "a1.gain=1,2,3,4")
     assert re.search(
-        r"UNSTABLE: .*: at 1 of 4 points \(1 stable, 2 not known\); worst at a1.gain = 3", text
+        r"UNSTABLE: .*: at 1 of 4 points \(1 stable, 2 not known\); least damping at .*; worst at a1.gain = 3",
+        text,
     )
     turns = (
         "stable at a1.gain = 1 .*, not known at a1.gain = 2 .*; "
@@ -570,6 +574,22 @@ def test_points_without_a_verdict_are_counted_and_warnings_are_said(
     assert re.search(
         r"not known: .*: 1 of 2 points have no verdict, 1 are stable, 0 are unstable", text
     )
+
+
+def test_the_least_damped_mode_stands_in_the_verdict_with_its_value():
+    """A verdict said "nothing grows at any of 5 points", and nothing of the damping."""
+    states = ("sg1.delta", "sg1.omega", "sg2.omega")
+    left = np.array([[0.5, 0.3, 0.2]] * 2, dtype=complex)
+    well, least = (
+        ModeSet(np.array([-1 + 9j, real + 4j]), left, np.ones_like(left), states)
+        for real in (-0.9, -0.2)
+    )
+    points = {(k,): PointRecord(modes=one) for k, one in enumerate((well, least, None))}
+    axes = [Axis("grid.X_L", "pu", "Line", (0.1, 0.2, 0.3))]
+    assert _least(SimpleNamespace(points=points), axes) == (
+        "; least damping at grid.X_L = 0.2 pu: 0.637 Hz, 4.99 % (sg1 0.80, sg2 0.20)"
+    )
+    assert _least(SimpleNamespace(points=dict.fromkeys(points, PointRecord())), axes) == ""
 
 
 def test_the_limit_that_was_written_is_named_rather_than_a_value_between():
