@@ -18,6 +18,8 @@ from orchestrator.studies.black_box.frequency_response import METHODS, Excitatio
 from orchestrator.studies.modes.request import ScenariosRequest
 from orchestrator.systems.coupling.schedule import SCHEDULES
 
+_ONE_SCENARIO = "the scenario (default: the first line tells which was taken)"
+
 
 def add_case_arguments(
     parser: argparse.ArgumentParser,
@@ -34,7 +36,7 @@ def add_case_arguments(
         nargs="?" if optional else None,
         help="a built-in case (two_area), or the path of a case file or an .ssp",
     )
-    text = f"only this scenario{' (repeatable)' if several else ''}"
+    text = "only this scenario (repeatable; default: all)" if several else _ONE_SCENARIO
     repeatable(parser, "--scenario", "NAME", text)
     add_options(parser, "case")
     add_trust_argument(parser)

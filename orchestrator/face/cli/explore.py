@@ -79,7 +79,8 @@ def run(options: argparse.Namespace) -> int:
     begin_imports()  # while the browser starts
     explorer = Explorer(word, beginning, port=options.port, trust_fmus=options.trust_fmus)
     print(
-        f"{explorer.address}  (ends by Ctrl-C, or a minute after its last page was closed)",
+        f"{explorer.address}  ({_first_of(case, options, name)}ends by Ctrl-C, or a minute after its last page was "
+        "closed)",
         flush=True,
     )
     if options.no_browser:
@@ -92,6 +93,13 @@ def run(options: argparse.Namespace) -> int:
     finally:
         remove(folder)
     return 0
+
+
+def _first_of(case: Case, options: argparse.Namespace, name: str) -> str:
+    """Tell which scenario of several is shown first where none was asked for."""
+    if options.scenario or len(case.scenarios) == 1:
+        return ""
+    return f"scenario {name} first, all can be chosen; "
 
 
 def _not_on_the_page(case: Case, shown: Sequence[str]) -> str:

@@ -11,7 +11,8 @@ from rich.console import Console, RenderableType
 from rich.markup import escape
 
 from orchestrator.cases.scenario.prepare import PreparedScenario
-from orchestrator.core.errors import number_of
+from orchestrator.core.errors import few, number_of
+from orchestrator.core.options import Option
 from orchestrator.core.safe_files import made_folder
 from orchestrator.face.api.progress import shown_progress
 from orchestrator.face.cli import arguments
@@ -37,6 +38,8 @@ from orchestrator.studies.points.study import PointStudy, StudyAtOnce
 from orchestrator.studies.points.under_way import counting
 
 Result = TypeVar("Result")
+
+_OTHERS = 6  # scenarios that are named beside the one that was taken
 
 
 class Progressing:
@@ -196,11 +199,25 @@ def present(
     if options.json:
         print_json(as_json())
     else:
+        taken = _taken(options, prepared)
+        if taken:
+            console.print(escape(taken), soft_wrap=True, highlight=False)
         print_parts(console, with_announced_questions(parts, prepared))
     for text in remarks:
         make_errors().print(escape(text), soft_wrap=True)
     if end and not options.json:
         console.print(escape(end), soft_wrap=True, highlight=False)
+
+
+def _taken(options: argparse.Namespace, prepared: Sequence[PreparedScenario]) -> str:
+    """Tell which scenario of several was taken where none was asked for; "" where one was, or all were."""
+    if getattr(options, "scenario", None) or len(prepared) != 1:
+        return ""
+    (one,) = prepared
+    others = [name for name in one.case.scenarios if name != one.name]
+    if not others:
+        return ""
+    return f"Scenario {one.name}; {Option.SCENARIO} takes another: {few(others, _OTHERS)}"
 
 
 class StudyCommand:
