@@ -5,7 +5,7 @@ measurements come. So it reaches no verdict."""
 
 import hashlib
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -160,6 +160,7 @@ def check_fmu(
     run_for: float = RUN_FOR,
     use: Use | None = None,
     seed: int | None = None,
+    told: Callable[[int, int], None] | None = None,
 ) -> AcceptanceReport:
     """Run the acceptance tests.
 
@@ -169,6 +170,7 @@ def check_fmu(
     ``use``: step, operating point and values with which it is used; what the file declares where None.
     ``seed``: of what is drawn at random; from the file's own bytes where None, so that its author cannot know it
     before.
+    ``told``: called with how many checks are done, and how many there are.
     Raises an `InputError` if there is no such file or no such check, or the binding is not TOML, not of its form or not
     filled in."""
     unknown = [name for name in only if name not in CHECKS and name not in FILE_CHECKS]
@@ -217,13 +219,17 @@ def check_fmu(
         runner = _Runner(report, subject, limits or Limits())
         try:
             with one_thread():  # products of thousands of steps with two numbers: threads only wait
-                runner.run(wanted)
+                runner.run(wanted, told or _nobody)
         finally:
             runner.close()
         report.results = without_consequences(report, subject.description)
     finally:
         remove_tree(directory)
     return report
+
+
+def _nobody(done: int, total: int) -> None:
+    """Tell nobody how many checks are done."""
 
 
 def _unpacked(fmu: Path) -> base.CheckResult:
@@ -315,9 +321,10 @@ class _Runner:
         finally:
             process.close()
 
-    def run(self, names: list[str]) -> None:
+    def run(self, names: list[str], told: Callable[[int, int], None]) -> None:
         results = self._report.results
         for place, name in enumerate(names):
+            told(place, len(names))
             self._deadline = monotonic() + _PATIENCE * crowded() * self._limits.seconds
             result = self._answer(CHECKS[name])
             cause = likely_cause(self._subject.description, result.fault)

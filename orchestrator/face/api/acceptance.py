@@ -1,5 +1,6 @@
 """Acceptance tests of an FMU."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -103,6 +104,7 @@ def check(
     frequency: float | None = None,
     time_limit: Time | None = None,
     memory_limit: float | str | None = None,
+    report: Callable[[int, int], None] | None = None,
 ) -> Acceptance:
     """Run the acceptance tests of an FMU: can it be trusted in a co-simulation?
 
@@ -134,6 +136,8 @@ def check(
         Wall-clock time that one call of the FMU may take [s]; 30 s by default.
     memory_limit
         Memory that the FMU's process may take [MB], or text such as ``"4 GB"``; 4096 MB by default, at least 32 MB.
+    report
+        Called with how many checks are done, and how many there are.
 
     Raises
     ------
@@ -184,9 +188,9 @@ def check(
                 f"frequency = {frequency}: {file.name} has no parameter f_n; a binding's [rating] has one"
             )
         use = replace(use, values={**use.values, "f_n": float(frequency)})
-    report = check_fmu(fmu, bound_by, limits, others, use=use, seed=seed)
-    report.results[:0] = of_the_dll
-    return Acceptance(report)
+    found = check_fmu(fmu, bound_by, limits, others, use=use, seed=seed, told=report)
+    found.results[:0] = of_the_dll
+    return Acceptance(found)
 
 
 def _conformity(file: Path, only: tuple[str, ...], limits: Limits) -> list[CheckResult]:

@@ -19,6 +19,7 @@ from orchestrator.core.late import import_xarray_alone, put_off_parts_of_numpy
 from orchestrator.core.safe_files import inputs, spare_input
 from orchestrator.core.spelling import as_options
 from orchestrator.core.uncollected import stay_uncollected, uncollected
+from orchestrator.face.cli.at_work import saying_that_it_is_at_work
 from orchestrator.face.cli.interrupted import ending, is_interrupt
 from orchestrator.face.cli.later import answer_first
 from orchestrator.output.results import origin
@@ -108,7 +109,8 @@ def _execute(words: Sequence[str], *, alone: bool) -> int:
         with calls, uncollected():
             # others' studies are looked for only where the command is none of ours: it takes a moment
             listed = COMMANDS if _command_in(words) else commands()
-            parser = _parser({_command_in(words, listed)}, listed)
+            command = _command_in(words, listed)
+            parser = _parser({command}, listed)
         if alone:
             stay_uncollected()
         options = parser.parse_args(words)
@@ -122,7 +124,7 @@ def _execute(words: Sequence[str], *, alone: bool) -> int:
                 from orchestrator.output.results.manifest import spare_result  # noqa: PLC0415 - only where it is needed
 
                 spare_result(path)
-        with answer_first():
+        with answer_first(), saying_that_it_is_at_work(command):
             return int(options.command(options))
     except (CosimError, SetupError, OSError) as error:
         if is_interrupt(error):

@@ -12,8 +12,10 @@ from orchestrator.devices.acceptance.checks.base import CheckResult, Verdict
 from orchestrator.devices.acceptance.runner import AcceptanceReport
 from orchestrator.devices.sandbox.protections_in_force import missing
 from orchestrator.face.api.acceptance import check
+from orchestrator.face.api.progress import shown_progress
 from orchestrator.face.cli.arguments import add_kept_argument, add_options
-from orchestrator.face.cli.terminal import keep_json, print_json
+from orchestrator.face.cli.progress_lines import both, progress_lines
+from orchestrator.face.cli.terminal import keep_json, make_console, print_json
 
 _COLOURS = {
     Verdict.PASS: "green",
@@ -33,19 +35,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Check, print, and write what is asked for; 1 if it is not to be accepted, 2 if it is not supported here."""
-    found = check(
-        options.file,
-        options.binding,
-        step=options.step,
-        only=options.only,
-        case=options.case or None,
-        component=options.component,
-        scenario=options.scenario,
-        seed=options.seed,
-        frequency=options.frequency,
-        time_limit=options.time_limit,
-        memory_limit=options.memory_limit,
-    )
+    with (
+        progress_lines(make_console(), "fmu check", "checks") as lines,
+        shown_progress("Checks", shown=not options.json) as report,
+    ):
+        found = check(
+            options.file,
+            options.binding,
+            step=options.step,
+            only=options.only,
+            case=options.case or None,
+            component=options.component,
+            scenario=options.scenario,
+            seed=options.seed,
+            frequency=options.frequency,
+            time_limit=options.time_limit,
+            memory_limit=options.memory_limit,
+            report=both(lines.report, report),
+        )
     if options.junit:
         found.save_junit(options.junit)
     keep_json(found.as_json(), options.out, "check")

@@ -1,6 +1,7 @@
 """How far a long command is, as lines on standard error where there is no terminal to draw a bar on."""
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from threading import Event, Thread
 from time import monotonic
 from types import TracebackType
@@ -8,13 +9,9 @@ from typing import Self
 
 from rich.console import Console
 
+from orchestrator.face.cli.at_work import EVERY, in_words, tell_instead
 from orchestrator.face.cli.terminal import make_errors
 from orchestrator.studies.points.under_way import doing, parts_done
-
-EVERY = 30.0  # from one line to the next [s]: a log of a night has some hundred
-_MINUTE = 60.0  # [s]
-_IN_SECONDS = 2 * _MINUTE  # times below this are told in seconds [s]
-_IN_WHOLE_MINUTES = 10 * _MINUTE  # below this a line and the next would tell the same minute [s]
 
 
 class ProgressLines:
@@ -28,6 +25,7 @@ class ProgressLines:
         self._stored: int | None = None  # what was there already when the first count came
         self._told = -1.0  # what the line before said is done
         self._began, self._ended = monotonic(), Event()
+        self._tells = ExitStack()
         self._thread = Thread(target=self._say_now_and_then, daemon=True)
 
     def report(self, done: int, total: int) -> None:
@@ -38,6 +36,7 @@ class ProgressLines:
 
     def __enter__(self) -> Self:
         if self._shown:
+            self._tells.enter_context(tell_instead(self))
             self._thread.start()
         return self
 
@@ -50,13 +49,14 @@ class ProgressLines:
         self._ended.set()
         if self._shown:
             self._thread.join()
+            self._tells.close()
 
     def line(self) -> str:
         """Return what is said now; while nothing is done since the line before, how long it takes is not guessed."""
         passed, (doing_now, part) = monotonic() - self._began, doing()
         if not self._total:
             which = f" {doing_now}" if doing_now else ""
-            return f"{self._name}: preparing{which}, {_in_words(passed)}"
+            return f"{self._name}: preparing{which}, {in_words(passed)}"
         stored = self._stored or 0
         # of a task that is under way, some parts may be done; all are not before its record is there
         under_way = min(stored + parts_done(), self._total - 1)
@@ -65,12 +65,12 @@ class ProgressLines:
         still, self._told = reached == self._told, reached
         at, what = "still at " if still else "", f" ({doing_now})" if doing_now else ""
         text = (
-            f"{self._name}: {at}{done} of {self._total} {self._counted}{what}, {_in_words(passed)}"
+            f"{self._name}: {at}{done} of {self._total} {self._counted}{what}, {in_words(passed)}"
         )
         if still or reached <= stored:
             return text
         left = passed * (self._total - reached) / (reached - stored)
-        return f"{text}, about {_in_words(left)} left"
+        return f"{text}, about {in_words(left)} left"
 
     def _say_now_and_then(self) -> None:
         while not self._ended.wait(EVERY):
@@ -80,13 +80,6 @@ class ProgressLines:
 def progress_lines(console: Console, name: str, counted: str) -> ProgressLines:
     """Lines where a console draws no bar."""
     return ProgressLines(name, counted, shown=not (console.is_terminal or console.is_jupyter))
-
-
-def _in_words(seconds: float) -> str:
-    if seconds < _IN_SECONDS:
-        return f"{seconds:.0f} s"
-    digits = 1 if seconds < _IN_WHOLE_MINUTES else 0
-    return f"{seconds / _MINUTE:.{digits}f} min"
 
 
 def both(one: Callable[[int, int], None], other: Callable[[int, int], None]) -> Callable[..., None]:

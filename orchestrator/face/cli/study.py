@@ -199,7 +199,7 @@ def present(
     if options.json:
         print_json(as_json())
     else:
-        taken = _taken(options, prepared)
+        taken = _which_scenario(options, prepared)
         if taken:
             console.print(escape(taken), soft_wrap=True, highlight=False)
         print_parts(console, with_announced_questions(parts, prepared))
@@ -209,7 +209,7 @@ def present(
         console.print(escape(end), soft_wrap=True, highlight=False)
 
 
-def _taken(options: argparse.Namespace, prepared: Sequence[PreparedScenario]) -> str:
+def _which_scenario(options: argparse.Namespace, prepared: Sequence[PreparedScenario]) -> str:
     """Tell which scenario of several was taken where none was asked for; "" where one was, or all were."""
     if getattr(options, "scenario", None) or len(prepared) != 1:
         return ""

@@ -1,7 +1,6 @@
 """The verdict on every scenario of a sweep, in the words of the terminal, of files and of pages."""
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 
 from orchestrator.linear.spectra.modes import damping_percent, mode_in_words
@@ -46,10 +45,11 @@ def _verdict(sweep: ScenarioSweep, axes: Sequence[Axis]) -> VerdictSentence:
 
 def _least(sweep: ScenarioSweep, axes: Sequence[Axis]) -> str:
     """The least damped mode of the range at all places of the grid, and where that is; "" without modes."""
+    modes_at = {place: sweep.points[place].modes for place in grid_places(axes)}
     found = [
         (place, modes, k)
-        for place in grid_places(axes)
-        if (modes := sweep.points[place].modes) is not None
+        for place, modes in modes_at.items()
+        if modes is not None
         for k in range(len(modes.eigenvalues))
     ]
     if not found:
@@ -57,10 +57,13 @@ def _least(sweep: ScenarioSweep, axes: Sequence[Axis]) -> str:
     place, modes, k = min(
         found, key=lambda one: damping_percent(complex(one[1].eigenvalues[one[2]]))
     )
-    shares: Counter[str] = Counter()
+    shares: dict[str, float] = {}
     for name, factor in zip(modes.names, modes.participation()[k], strict=True):
-        shares[name.partition(".")[0]] += float(factor)
-    told = mode_in_words(complex(modes.eigenvalues[k]), shares.most_common())
+        component = name.partition(".")[0]
+        shares[component] = shares.get(component, 0.0) + float(factor)
+    told = mode_in_words(
+        complex(modes.eigenvalues[k]), sorted(shares.items(), key=lambda entry: -entry[1])
+    )
     return f"; least damping at {place_text(axes, place)}: {told}"
 
 

@@ -3,12 +3,14 @@
 import json
 import re
 import time
+from types import SimpleNamespace
 
 import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.core.errors import InputError
-from orchestrator.face.cli import explore, main, progress_lines, sensitivities
+from orchestrator.face.api import acceptance
+from orchestrator.face.cli import at_work, explore, main, progress_lines, sensitivities
 from orchestrator.face.cli.progress_lines import ProgressLines
 from orchestrator.studies.points.under_way import (
     counting,
@@ -229,3 +231,41 @@ def test_parts_are_told_to_nobody_once_nobody_counts():
     tell_part()
     assert parts_done() == 0
     join(None)
+
+
+def test_a_command_without_a_count_says_that_it_is_at_work(capsys, monkeypatch):
+    """A check of an FMU said nothing for a minute where its output was a pipe."""
+
+    def say_twice(command):
+        waits = iter([False, False, True])
+        at_work._say_now_and_then(command, SimpleNamespace(wait=lambda seconds: next(waits)))
+        return capsys.readouterr().err
+
+    assert say_twice("modes") == "modes: at work, 0 s\n" * 2
+    with at_work.tell_instead("another"):
+        assert say_twice("screen") == ""
+    started = []
+
+    def thread(**given):
+        return SimpleNamespace(start=lambda: started.append(given), join=lambda: None)
+
+    monkeypatch.setattr(at_work, "Thread", thread)
+    for command in ("modes", "mcp", None):
+        with at_work.saying_that_it_is_at_work(command):
+            pass
+    assert len(started) == 1
+
+
+def test_a_check_counts_its_questions(monkeypatch):
+    """The count goes to whoever waits: a bar, or a line on standard error."""
+    counts = []
+
+    def checked(*given, told, **more):
+        told(3, 25)
+        raise InputError("enough")
+
+    monkeypatch.setattr(acceptance, "check_fmu", checked)
+    monkeypatch.setattr(acceptance, "as_fmu", lambda file: file)
+    with pytest.raises(InputError, match="enough"):
+        acceptance.check("a.fmu", report=lambda *count: counts.append(count))
+    assert counts == [(3, 25)]

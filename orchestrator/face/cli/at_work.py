@@ -1,0 +1,61 @@
+"""A line now and then of a command that is at work, for whoever waits where no terminal shows a bar."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Event, Thread
+from time import monotonic
+
+EVERY = 30.0  # from one line to the next [s]: a log of a night has some hundred
+_MINUTE = 60.0  # [s]
+_IN_SECONDS = 2 * _MINUTE  # times below this are told in seconds [s]
+_IN_WHOLE_MINUTES = 10 * _MINUTE  # below this a line and the next would tell the same minute [s]
+
+_SERVERS = ("explore", "mcp")
+"""Commands that wait for questions, and end when they are told to."""
+
+_telling: list[object] = []
+"""What tells how far the command is, and so more than that it is at work."""
+
+
+@contextmanager
+def tell_instead(teller: object) -> Iterator[None]:
+    """Inside, somebody else tells how far the command is."""
+    _telling.append(teller)
+    try:
+        yield
+    finally:
+        _telling.remove(teller)
+
+
+@contextmanager
+def saying_that_it_is_at_work(command: str | None) -> Iterator[None]:
+    """Inside, say every `EVERY` seconds that a command is at work, unless somebody tells more."""
+    if command is None or command in _SERVERS or sys.stdout.isatty():
+        yield
+        return
+    ended = Event()
+    thread = Thread(target=_say_now_and_then, args=(command, ended), daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+
+
+def _say_now_and_then(command: str, ended: Event) -> None:
+    began = monotonic()
+    while not ended.wait(EVERY):
+        if not _telling:
+            print(
+                f"{command}: at work, {in_words(monotonic() - began)}", file=sys.stderr, flush=True
+            )
+
+
+def in_words(seconds: float) -> str:
+    """``90 s``, ``4.5 min``, ``25 min``."""
+    if seconds < _IN_SECONDS:
+        return f"{seconds:.0f} s"
+    digits = 1 if seconds < _IN_WHOLE_MINUTES else 0
+    return f"{seconds / _MINUTE:.{digits}f} min"
