@@ -30,6 +30,7 @@ from tests.support.durations import (
     may_be_chosen,
     require_readable,
 )
+from tests.support.few_files import require_few_files
 from tests.support.reports import FewReports, asks_for_seconds
 from tests.support.skips import Skips, in_ci
 from tests.support.undrawn import write_empty
@@ -37,11 +38,13 @@ from tests.support.undrawn import write_empty
 
 def pytest_configure(config):
     """No garbage is looked for among what is collected, which stays; nothing that is written waits for the disk.
+    A library for Windows that needs all of mingw's files is a failure.
 
     In CI a skip that is not on the list fails the session; with xdist the process that started the others counts.
     """
     gc.disable()
     keep()
+    require_few_files()
     os.fsync = lambda handle: None  # no test cuts the power, and thousands of files would wait
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         # a shell starts what runs in its background deaf to Ctrl-C, and all that this starts would

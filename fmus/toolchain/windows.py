@@ -18,6 +18,7 @@ MACHINES = {
 _SOURCE_FILES = (
     # of a library
     *("misc/dllmain.c", "misc/ucrt_amsg_exit.c", "math/fpclassify.c"),
+    *("misc/fegetenv.c", "misc/fesetenv.c", "misc/mingw_controlfp.c", "misc/mingw_setfp.c"),
     *("crt/CRT_fp10.c", "crt/cinitexe.c", "crt/gccmain.c", "crt/mingw_helpers.c", "crt/natstart.c"),
     *("crt/pesect.c", "crt/pseudo-reloc.c", "crt/pseudo-reloc-list.c"),
     *("crt/tlsmcrt.c", "crt/tlssup.c", "crt/tlsthrd.c"),
@@ -41,20 +42,22 @@ _IMPORTS = {
     "api-ms-win-crt-environment-l1-1-0.dll": "__p__environ getenv",
     "api-ms-win-crt-heap-l1-1-0.dll": "_set_new_mode calloc free malloc realloc",
     "api-ms-win-crt-locale-l1-1-0.dll": "_configthreadlocale",
-    "api-ms-win-crt-math-l1-1-0.dll": "__setusermatherr acos asin atan atan2 cosh hypot nearbyint pow sinh tanh",
+    "api-ms-win-crt-math-l1-1-0.dll": "__setusermatherr acos asin atan atan2 cosh hypot nearbyint pow "
+    "remainder sinh tanh",
     "api-ms-win-crt-private-l1-1-0.dll": "memchr strchr strrchr strstr",
     "api-ms-win-crt-runtime-l1-1-0.dll": "__p___argc __p___argv _cexit _configure_narrow_argv _crt_atexit "
     "_execute_onexit_table _exit _initialize_narrow_environment _initialize_onexit_table _initterm _initterm_e "
     "_register_onexit_function _seh_filter_exe _set_app_type _set_invalid_parameter_handler abort exit "
     "_XcptFilter==_seh_filter_exe __set_app_type==_set_app_type",
     "api-ms-win-crt-stdio-l1-1-0.dll": "__acrt_iob_func __p__commode __p__fmode __stdio_common_vfprintf "
-    "__stdio_common_vsprintf _wfopen fclose fflush fgets fopen fputc fputs fread fwrite puts setvbuf",
+    "__stdio_common_vsprintf _wfopen fclose fflush fgets fopen fputc fputs fread fseek ftell fwrite puts rewind "
+    "setvbuf",
     "api-ms-win-crt-string-l1-1-0.dll": "strcmp strcpy strncmp strncpy",
     "KERNEL32.dll": "CloseHandle@4 CopyFileA@12 CreateFileA@28 CreateFileMappingA@24 CreateFileW@28 CreateThread@24 "
     "DeleteCriticalSection@4 DeleteFileA@4 EnterCriticalSection@4 ExitProcess@4 FreeLibrary@4 "
-    "GetLastError@0 GetModuleFileNameA@12 GetModuleFileNameW@12 GetModuleHandleA@4 GetModuleHandleExA@12 "
-    "GetModuleHandleExW@12 GetModuleHandleW@4 GetProcAddress@8 GetTempFileNameA@16 GetTempPathA@8 "
-    "InitializeCriticalSection@4 LeaveCriticalSection@4 LoadLibraryA@4 LoadLibraryExW@12 LoadLibraryW@4 "
+    "GetExitCodeProcess@8 GetLastError@0 GetModuleFileNameA@12 GetModuleFileNameW@12 GetModuleHandleA@4 "
+    "GetModuleHandleExA@12 GetModuleHandleExW@12 GetModuleHandleW@4 GetProcAddress@8 GetTempFileNameA@16 "
+    "GetTempPathA@8 InitializeCriticalSection@4 LeaveCriticalSection@4 LoadLibraryA@4 LoadLibraryExW@12 LoadLibraryW@4 "
     "MapViewOfFile@20 MoveFileExA@12 MultiByteToWideChar@24 QueryPerformanceCounter@4 "
     "QueryPerformanceFrequency@4 SetErrorMode@4 SetUnhandledExceptionFilter@4 Sleep@4 TlsGetValue@4 "
     "VirtualProtect@16 VirtualQuery@12 WaitForSingleObject@8 WriteFile@20",

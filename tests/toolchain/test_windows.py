@@ -1,5 +1,6 @@
 """Libraries for Windows, linked with few of mingw's files: the same to the last byte as with all of them."""
 
+from inspect import unwrap
 from pathlib import Path
 
 import pytest
@@ -54,7 +55,7 @@ def source_of(ending):
 def ways(source, target, ending, folder):
     """The ways of a source, to be run in the folder."""
     (folder / "source.c").write_text(source, encoding="utf-8")
-    return list(_ways(target, ending, (), folder / f"library{ending}"))
+    return list(unwrap(_ways)(target, ending, (), folder / f"library{ending}"))
 
 
 @pytest.fixture
