@@ -38,7 +38,7 @@ from tests.support.undrawn import write_empty
 
 def pytest_configure(config):
     """No garbage is looked for among what is collected, which stays; nothing that is written waits for the disk.
-    A library for Windows that needs all of mingw's files is a failure.
+    A library for Windows or a Mac that needs all of zig's files is a failure.
 
     In CI a skip that is not on the list fails the session; with xdist the process that started the others counts.
     """

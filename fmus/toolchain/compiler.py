@@ -38,7 +38,8 @@ FLAGS = (
 """Flags of every library."""
 
 # Without a name of its own a Mac library would carry the path of the temporary folder.
-_MAC_FLAGS = ("-Wl,-install_name,@rpath/library.dylib",)
+_MAC_NAME = "@rpath/library.dylib"
+_MAC_FLAGS = (f"-Wl,-install_name,{_MAC_NAME}",)
 
 
 WASM = "wasm32-wasi"
@@ -156,6 +157,8 @@ def compile_for(source: str, target: str, ending: str, libraries: Sequence[str] 
             said = _run(way, folder)
             if said is None:
                 return keep(library, built.read_bytes())
+            if _NOT_C.search(said):
+                break
         raise RuntimeError(f"the C compiler (ziglang) failed for {target}:\n{said}")
     finally:
         remove(folder)
@@ -173,12 +176,15 @@ def _run(commands: Sequence[Sequence[str]], folder: Path) -> str | None:
 
 
 _SOURCE = "source.c"  # what messages of the compiler name
+_NOT_C = re.compile(rf"^{re.escape(_SOURCE)}:\d+:\d+: (fatal )?error: ", re.MULTILINE)
 _OBJECT = "source.obj"
 
-_WITHOUT_RUNTIME = (
-    *("-fno-compiler-rt", "-z", "defs"),  # a call of the runtime library is an error at once
-    *("-fno-soname", "-O", "ReleaseFast", "-fstrip"),  # as `zig cc` has it for `FLAGS`
-)
+# a call of the runtime library is an error at once; the rest is as `zig cc` has it for `FLAGS`
+_WITHOUT_RUNTIME = ("-fno-compiler-rt", "-O", "ReleaseFast", "-fstrip")
+_WITHOUT_RUNTIME_FOR = {
+    "linux": (*_WITHOUT_RUNTIME, "-z", "defs", "-fno-soname"),
+    "macos": (*_WITHOUT_RUNTIME, "-install_name", _MAC_NAME),
+}
 
 
 def _ways(
@@ -187,16 +193,18 @@ def _ways(
     """Yield ways to make a library, to be tried one after the other: commands of zig; each way that succeeds writes the
     same bytes.
 
-    What zig brings as source, it compiles once in each new environment. So a library for Linux is first linked without
-    its runtime library (4 s of processor), which our code calls nothing of, and one for Windows with those files alone
-    of mingw's C library (100 s as a whole) that our code uses. Code that needs more is linked as all other."""
+    What zig brings as source, it compiles once in each new environment. So a library for Linux or a Mac is first linked
+    without its runtime library (4 s of processor for each), which our code calls nothing of, and one for Windows with
+    those files alone of mingw's C library (100 s as a whole) that our code uses. Code that needs more is linked as all
+    other."""
     linked = ["-lm", *(f"-l{name}" for name in libraries)]
     flags = _flags(target, ending)
-    own = [flag for flag in flags if flag != "-shared"]
-    if ending == ENDINGS["linux64"]:
+    own = [flag for flag in flags if flag not in ("-shared", *_MAC_FLAGS)]
+    system = target.split("-")[1]
+    if system in _WITHOUT_RUNTIME_FOR and ending in ENDINGS.values():
         yield [
             [
-                *("build-lib", "-dynamic", "-target", target, *_WITHOUT_RUNTIME),
+                *("build-lib", "-dynamic", "-target", target, *_WITHOUT_RUNTIME_FOR[system]),
                 *("-lc", *linked, f"-femit-bin={built}", "-cflags", *own, "--", _SOURCE),
             ]
         ]

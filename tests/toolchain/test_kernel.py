@@ -3,13 +3,21 @@
 import contextlib
 import ctypes
 import math
+from inspect import unwrap
 
 import casadi as ca
 import numpy as np
 import pytest
 
 from fmus.toolchain import symbols
-from fmus.toolchain.compiler import TARGETS, _run, _ways, compile_library, host_platform
+from fmus.toolchain.compiler import (
+    TARGETS,
+    _run,
+    _ways,
+    compile_for,
+    compile_library,
+    host_platform,
+)
 from fmus.toolchain.kernel import c_source
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.tape import tape_of
@@ -337,22 +345,37 @@ __attribute__((visibility("default"))) double third(double a) { return printf(""
 """
 
 
+MACS = TARGETS["darwin64"]
+
+
 @pytest.mark.parametrize(
-    ("source", "succeed"), [(NEEDS_NONE, [True, True]), (NEEDS_A_RUNTIME, [False, True])]
+    ("target", "source", "succeed"),
+    [
+        (TARGETS["linux64"][0], NEEDS_NONE, [True, True]),
+        (TARGETS["linux64"][0], NEEDS_A_RUNTIME, [False, True]),
+        # a Mac's own library has the functions of that runtime
+        *(
+            pytest.param(mac, source, [True, True], marks=[pytest.mark.nightly, pytest.mark.slow])
+            for mac in MACS
+            for source in (NEEDS_NONE, NEEDS_A_RUNTIME)
+        ),
+    ],
 )
-def test_a_library_for_linux_is_the_same_without_zigs_own_runtime_or_has_it(
-    source, succeed, tmp_path
+def test_a_library_is_the_same_without_zigs_own_runtime_or_has_it(
+    target, source, succeed, tmp_path
 ):
     """zig compiles its runtime library anew in each new environment."""
     (tmp_path / "source.c").write_text(source, encoding="utf-8")
-    built = tmp_path / "built.so"
+    ending = ".dylib" if target in MACS else ".so"
+    built = tmp_path / f"library{ending}"
     made = []
-    for way in _ways(TARGETS["linux64"][0], ".so", (), built):
+    for way in unwrap(_ways)(target, ending, (), built):
         made.append(built.read_bytes() if _run(way, tmp_path) is None else None)
+        built.unlink(missing_ok=True)
     assert [content is not None for content in made] == succeed
-    kept = compile_library(source, "linux64")
+    kept = compile_for(source, target, ending)
     assert {content for content in made if content} == {kept.read_bytes()}
-    if host_platform() == "linux64":
+    if host_platform() == "linux64" and ending == ".so":
         third = ctypes.CDLL(str(kept)).third
         third.argtypes, third.restype = [ctypes.c_double], ctypes.c_double
         assert third(9.0) == 3.0
