@@ -7,6 +7,8 @@ from dataclasses import replace
 import pytest
 
 import orchestrator as gfor
+from fmus.toolchain.compiler import host_platform
+from orchestrator.devices.fmi.instance import is_ours
 from orchestrator.simulation.watch.finding import BENCH_RESONANCE
 from orchestrator.studies.certification.codes import bench_point
 from orchestrator.studies.certification.codes.all_codes import CODES
@@ -26,10 +28,15 @@ from tests.support.grid_codes import replace_code
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module")
-def converter(tmp_path_factory):
-    """Compiled, which gives what the one with Python in it gives in half the time."""
-    return gfor.build("gfor", tmp_path_factory.mktemp("fmu"), native=True)
+@pytest.fixture
+def converter(fmu_path):
+    """Compiled, which gives what the one with Python in it gives in half the time; in this process, as ours are."""
+    return fmu_path("gfor", native=True)
+
+
+@pytest.fixture
+def follower(fmu_path):
+    return fmu_path("gfl", native=True)
 
 
 @pytest.fixture
@@ -111,12 +118,12 @@ def test_ours_meets_the_jump_is_kept_and_its_certificate_verifies(
 
 
 def test_a_row_of_another_converter_is_seen_when_it_is_computed_anew(
-    converter, tmp_path, one_row, gfor_command
+    converter, follower, tmp_path, one_row, gfor_command
 ):
     """All hashes fit, and every verdict follows from the responses; these are those of ours."""
     folders = [tmp_path / "ours", tmp_path / "theirs"]
     found = []
-    for folder, fmu in zip(folders, (converter, gfor.build("gfl", tmp_path / "fmu")), strict=True):
+    for folder, fmu in zip(folders, (converter, follower), strict=True):
         folder.mkdir()
         found.append(certify_code(CertificationRequest(fmu), one_row, Serial(), folder))
     ours, theirs = found
@@ -130,7 +137,7 @@ def test_a_row_of_another_converter_is_seen_when_it_is_computed_anew(
 
 
 def test_an_honest_device_that_feeds_the_bench_s_resonance_is_not_failed(
-    tmp_path, one_row, gfor_command
+    tmp_path, one_row, gfor_command, in_process
 ):
     """Matching control, whose current lags by 3 ms, and whose verdict nobody can change by leaving the finding out."""
     fmu = build(device("matching", "MATCHING"), tmp_path)
@@ -183,9 +190,11 @@ def test_rows_are_drawn_by_their_margin_and_by_chance():
     assert choose({"rows": rows}, ("d",)) == ["d"]
 
 
-def test_a_converter_without_damping_does_not_settle(converter, tmp_path):
-    """A lag of 5 s in the droop's measurement leaves a swing of small damping."""
-    request = CertificationRequest(converter, None, {"droop.tau_P": 5.0})
+def test_a_converter_without_damping_does_not_settle(tmp_path):
+    """A lag of 5 s in the droop's measurement leaves a swing of small damping. It runs in a process of its own."""
+    built = gfor.build("gfor", tmp_path, native=True, platforms=[host_platform()])
+    assert not is_ours(built)
+    request = CertificationRequest(built, None, {"droop.tau_P": 5.0})
     (row,) = certify_code(request, ERCOT, Serial(), tmp_path, ("phase_jumps",)).verdicts
     assert not row.accepted
     assert "settles" in [finding.criterion for finding in row.failed]
@@ -218,9 +227,8 @@ def test_the_limit_of_the_current_decides_whether_a_dip_to_nothing_is_ridden_thr
 
 
 @pytest.mark.parametrize(("code", "row"), [("aemo", "jump_10"), ("fingrid", "jumps")])
-def test_a_grid_following_converter_does_not_oppose_jumps(tmp_path, code, row):
+def test_a_grid_following_converter_does_not_oppose_jumps(follower, tmp_path, code, row):
     """It rides through them, settles and returns; nothing else tells it from a grid-forming one."""
-    follower = gfor.build("gfl", tmp_path / "fmu")
     (verdict,) = certify_code(
         CertificationRequest(follower), CODES[code], Serial(), tmp_path, (row,)
     ).verdicts

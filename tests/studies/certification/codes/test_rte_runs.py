@@ -5,7 +5,6 @@ import math
 
 import pytest
 
-import orchestrator as gfor
 from orchestrator.core.errors import ComponentError
 from orchestrator.studies.black_box.frequency_response import Excitation
 from orchestrator.studies.certification.codes import bench_point, perturbation_plot
@@ -27,10 +26,10 @@ TRUE = {"X_eff": 0.15, "D": 20.0, "H": 1.0}
 """Of our converter: the reactance of its transformer, 1/R_f, and τ_P/(2·R_f)."""
 
 
-@pytest.fixture(scope="module")
-def converter(tmp_path_factory):
-    """Compiled, which gives what the one with Python in it gives in half the time."""
-    return gfor.build("gfor", tmp_path_factory.mktemp("fmu"), native=True)
+@pytest.fixture
+def converter(fmu_path):
+    """Compiled, which gives what the one with Python in it gives in half the time; in this process, as ours are."""
+    return fmu_path("gfor", native=True)
 
 
 @pytest.fixture(name="gfor_command")
@@ -65,10 +64,16 @@ def test_ours_meets_what_its_parameters_declare_and_the_certificate_verifies(con
     assert "come to other findings" in " ".join(verify_files(*read_certificate(tmp_path)).faults)
 
 
+@pytest.fixture(scope="module")
+def row_folder(tmp_path_factory):
+    """Where a row of ours is kept that is judged by several declarations."""
+    return tmp_path_factory.mktemp("row")
+
+
 @pytest.mark.parametrize("wrong", [{"H": 4.0}, {"D": 80.0}, {"X_eff": 0.6}])
-def test_a_wrong_declaration_is_seen(converter, tmp_path, wrong):
+def test_a_wrong_declaration_is_seen(converter, row_folder, wrong):
     assert "power after the jump ahead" in failed(
-        converter, tmp_path, "igfm1_scr10_pm50", declared=TRUE | wrong
+        converter, row_folder, "igfm1_scr10_pm50", declared=TRUE | wrong
     )
 
 
@@ -84,8 +89,8 @@ def test_a_converter_without_damping_swings_out_of_its_envelope(converter, tmp_p
 @pytest.mark.parametrize(
     "row", ["igfm1_scr10_p50", "igfm2_scr10_p0", "igfm3_scr10_p50_scr2", "igfm4_scr10_p0_2"]
 )
-def test_a_grid_following_converter_fails_every_kind_of_row(tmp_path, row):
-    follower = gfor.build("gfl", tmp_path / "fmu")
+def test_a_grid_following_converter_fails_every_kind_of_row(fmu_path, tmp_path, row):
+    follower = fmu_path("gfl", native=True)
     assert any(name != "stable" for name in failed(follower, tmp_path, row))
 
 
