@@ -63,6 +63,9 @@ static const double START[SIZE] = {RATING, 0.5 * P_UNIT, 0, V_UNIT, 0, DROOP, 0.
 
 typedef struct { double re, im; } phasor;
 
+/* As hypot(), in a tenth of its time: no voltage or current is so large or small that its square has no number. */
+static double magnitude(double re, double im) { return sqrt(re * re + im * im); }
+
 static phasor times(phasor a, phasor b) { return (phasor){a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re}; }
 static phasor over(phasor a, phasor b) {
     const double s = b.re * b.re + b.im * b.im;
@@ -97,7 +100,7 @@ static void initialise(double *z, double *m) {
     m[DELTA] = KIND == FOLLOWING ? z[THETA_0] : atan2(e.im, e.re);
     const phasor own = turned(i, -m[DELTA]);
     m[I_D] = m[X_D] = own.re, m[I_Q] = m[X_Q] = own.im;
-    m[E] = m[E_0] = hypot(e.re, e.im);
+    m[E] = m[E_0] = magnitude(e.re, e.im);
     m[W] = 0, m[Q_SUM] = 0, m[V_F] = m[V_REF] = v, m[NOW] = 0;
     m[P_F] = m[P_REF] = p, m[SOURCE] = KIND == FOLLOWING ? 0 : p, m[Q_F] = m[Q_REF] = q;
 }
@@ -121,7 +124,7 @@ static double slip(const double *z, const double *m, phasor v) {
 }
 
 static void rates(const double *z, const double *m, phasor v, double *d) {
-    const double size_v = hypot(v.re, v.im);
+    const double size_v = magnitude(v.re, v.im);
     const phasor own = turned(v, -m[DELTA]), i = {m[I_D], m[I_Q]};
     const double p = own.re * i.re + own.im * i.im, q = own.im * i.re - own.re * i.im;
     double e = KIND == OSCILLATOR ? m[E] : m[E_0] + Q_DROOP * (m[Q_REF] - m[Q_F]);
@@ -160,7 +163,7 @@ static void rates(const double *z, const double *m, phasor v, double *d) {
         wanted = (phasor){0.5 * error.re + m[X_D], 0.5 * error.im + m[X_Q]};
 #endif
     }
-    const double size = hypot(wanted.re, wanted.im), part = size > 1e-9 ? limited(size) / size : 1;
+    const double size = magnitude(wanted.re, wanted.im), part = size > 1e-9 ? limited(size) / size : 1;
     const phasor given = {part * wanted.re, part * wanted.im};
 #ifdef VOLTAGE_LOOP
     double back = 2 * VOLTAGE_LOOP; /* of the anti-windup [1/s] */

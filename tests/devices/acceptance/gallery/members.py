@@ -106,7 +106,8 @@ def converter(
         ]
     if pod:
         variables += DAMPING_CONTROLLER
-        defines = {"POD": 1, **defines}
+        defines = {"POD": 1, "INTERNAL": POD_STEP, **defines}
+        step_size = POD_STEP
     return Source(
         name,
         "converter.c",
@@ -117,6 +118,9 @@ def converter(
         state,
     )
 
+
+POD_STEP = "5e-4"
+"""Communication and internal step [s] of one with a damping controller, which is watched for minutes."""
 
 DAMPING_CONTROLLER = (
     Variable("pod_p.enabled", 0, "parameter", 0, "", variability="tunable", type="Boolean"),
@@ -551,7 +555,7 @@ def damping():
         one(
             "pod_gain_of_step",
             "POD follows the step",
-            FAULT_POD_TIMES="(last_step > 1.5e-4 ? 0.5 : 1)",
+            FAULT_POD_TIMES="(last_step > 1.5 * INTERNAL ? 0.5 : 1)",
         ),
         one("pod_dead_after_a_while", "POD changes with time", FAULT_POD_TIMES="(m[AGE] < 50)"),
         one(

@@ -174,10 +174,12 @@ QUICK = Excitation(lowest_hz=1.0, lines=40, settled=1e-3)
 
 
 @pytest.mark.parametrize(("model", "is_one"), [("gfor", True), ("gfl", False)])
-def test_the_command_tells_ours_apart(gfor_command, tmp_path, monkeypatch, model, is_one):
+def test_the_command_tells_ours_apart(
+    gfor_command, fmu_path, tmp_path, monkeypatch, undrawn, model, is_one
+):
     monkeypatch.setattr(measurement, "WHOLE", QUICK)
     monkeypatch.setattr(measurement, "POINTS", POINTS[:1])
-    fmu, out = gfor.build(model, tmp_path), tmp_path / "out"
+    fmu, out = fmu_path(model, native=True), tmp_path / "out"
     code, printed, _ = gfor_command("certify", fmu, "--code", "frequency", "--out", out, "--json")
     figures = json.loads(printed)
     assert code == (0 if is_one else 1)
@@ -192,12 +194,12 @@ def test_the_command_tells_ours_apart(gfor_command, tmp_path, monkeypatch, model
     assert ratios == list(RATIOS)
 
 
-def test_python_gives_what_the_command_gives(tmp_path, monkeypatch):
+def test_python_gives_what_the_command_gives(fmu_path, tmp_path, monkeypatch):
     (stiff,) = measured(0.1)
     seen = impedances(F, behind(0.01, 0.1), 0.0, RATED)
     points = [replace(stiff, impedances=seen, strengths=Strengths((), 0.0))]
     monkeypatch.setattr(measurement, "measure_points", lambda request, f_n, report: points)
-    found = gfor.voltage_source(gfor.build("gfor", tmp_path))
+    found = gfor.voltage_source(fmu_path("gfor"))
     assert found.verdict is True
     assert "it behaves as a voltage source" in found.sentence
     assert found.as_json() == files.figures_of(points, "gfor", RATED)
