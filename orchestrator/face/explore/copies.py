@@ -23,6 +23,8 @@ from typing import IO
 _ROOT = str(Path(__file__).parents[3])
 _NUMBER = 64
 """Bytes that hold the number of a process, or the code that it ended with."""
+_LOOK = 0.05
+"""Longest between two looks at what is known [s]: what a thread waits for may be read by another one as it wakes up."""
 _UNKNOWN = 255
 """The code of a process of whose end nobody tells, because whoever watched it was ended as well."""
 
@@ -57,7 +59,7 @@ class Copy:
             left = None if end is None else end - time.monotonic()
             if is_known() or (left is not None and left <= 0.0):
                 return
-            select.select([self._line], [], [], left)
+            select.select([self._line], [], [], _LOOK if left is None else min(left, _LOOK))
 
     def _read_what_came(self) -> None:
         """Take the number, and after it the code of the end, as far as they were told."""

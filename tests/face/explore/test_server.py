@@ -1,12 +1,14 @@
 """The server of `gfor explore`: who may ask, and what comes of a process that computes."""
 
 import http.client
+import io
 import json
 import os
 import queue
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -320,6 +322,25 @@ def test_the_process_that_was_copied_is_begun_anew_where_it_died(computing):
     assert "answer" in other.ask("p", {"ask": "open"}, lambda part: None)
     assert copies._original._process.pid != before.pid
     other.close()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere no process is copied")
+def test_what_another_thread_read_is_known_to_all_who_wait(monkeypatch):
+    """Who was about to wait for a process' number slept on after another one had read it, and never ended it."""
+    line, told = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    copy, select = copies.Copy(line, io.StringIO(), io.StringIO()), copies.select.select
+
+    def overtaken(read, write, other, timeout):
+        if timeout != 0.0 and not copy.is_there:
+            told.send(b"7")
+            assert copy.is_there
+        return select(read, write, other, 5.0 if timeout is None else timeout)
+
+    monkeypatch.setattr(copies.select, "select", overtaken)
+    begin = time.monotonic()
+    assert copy.pid == 7
+    assert time.monotonic() - begin < 4.0
+    told.close()
 
 
 @pytest.mark.slow
