@@ -25,7 +25,7 @@ from orchestrator.output.report.notebook import page
 from orchestrator.output.results import origin
 
 if TYPE_CHECKING:
-    from orchestrator.face.api import studies
+    from orchestrator.face.api import choice, studies
 
 
 def _from_python() -> dict[str, str]:
@@ -95,15 +95,16 @@ def load(case: str | Path | Mapping[str, Any], *, trust_fmus: bool = False) -> "
 
 
 class _Late:
-    """A method of `studies`, which is imported where one is first asked for: it takes a second, and `load` none."""
+    """A method of a module that is imported where one is first asked for: `studies` takes a second, and `load` none."""
+
+    def __init__(self, module: str) -> None:
+        self._module = f"orchestrator.face.api.{module}"
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
 
     def __get__(self, instance: object, owner: type) -> Any:
-        setattr(
-            owner, self._name, getattr(import_module("orchestrator.face.api.studies"), self._name)
-        )
+        setattr(owner, self._name, getattr(import_module(self._module), self._name))
         return getattr(owner if instance is None else instance, self._name)
 
 
@@ -186,8 +187,8 @@ class Case(Unchanged):
         )
 
     if TYPE_CHECKING:
-        scenario = studies.scenario
-        choose = studies.choose
+        scenario = choice.scenario
+        choose = choice.choose
         sweep = studies.sweep
         screen = studies.screen
         site = studies.site
@@ -195,8 +196,9 @@ class Case(Unchanged):
         design = studies.design
         design_over_points = studies.design_over_points
     else:
-        scenario, choose, sweep, screen, site, interactions, design, design_over_points = (
-            _Late() for _ in range(8)
+        scenario, choose = (_Late("choice") for _ in range(2))
+        sweep, screen, site, interactions, design, design_over_points = (
+            _Late("studies") for _ in range(6)
         )
 
     if not TYPE_CHECKING:  # a study of another distribution

@@ -6,21 +6,15 @@ from pathlib import Path
 from typing import Any, Concatenate, cast
 
 from orchestrator.cases.case import Case as CaseFile
-from orchestrator.cases.case import with_protection
-from orchestrator.cases.forcing import with_events
-from orchestrator.core.asked import names as names_given
 from orchestrator.core.asked import path as path_of
-from orchestrator.core.asked import text_or_none
 from orchestrator.core.errors import InputError
 from orchestrator.face.api.methods import Asks, Shown, method
 from orchestrator.face.api.progress import shown_progress, shown_stages
-from orchestrator.face.api.scenario import Scenario, question
-from orchestrator.face.api.scenario import choose as chosen_of
+from orchestrator.face.api.scenario import question
 from orchestrator.output.results.lock import hold_folder
 from orchestrator.studies.coordinated_design.command import STUDY as COORDINATED_DESIGN
 from orchestrator.studies.coordinated_design.one_point import design_controller
 from orchestrator.studies.interactions.command import STUDY as INTERACTIONS
-from orchestrator.studies.modes.request import ScenarioRequest, ScenariosRequest
 from orchestrator.studies.pod_design.design import DesignRequest
 from orchestrator.studies.pod_design.view import ControllerDesign
 from orchestrator.studies.points.points import nobody
@@ -29,29 +23,6 @@ from orchestrator.studies.points.study import PointStudy, Study, StudyAtOnce, ch
 from orchestrator.studies.screening.command import STUDY as SCREENING
 from orchestrator.studies.siting.command import STUDY as SITING
 from orchestrator.studies.sweep.command import STUDY as SWEEP
-from orchestrator.systems.coupling.no_trip_regions import NoTripCode
-
-
-def _scenario(case: Any, request: ScenarioRequest) -> Scenario:
-    known, name = ", ".join(case.scenarios), request.name
-    text_or_none(name, "name", f"give the name of one scenario: {known}")
-    if name is None and len(case.scenarios) != 1:
-        raise InputError(
-            f"{case.name}: the case has {len(case.scenarios)} scenarios; choose one of: {known}"
-        )
-    file = with_events(
-        case.file, names_given(request.force, "force"), names_given(request.fault, "fault")
-    )
-    file = with_protection(file, cast("NoTripCode | None", request.protection))
-    (chosen,) = chosen_of(file, [name] if name else [], request)
-    question([chosen.prepared], above=1)
-    return chosen
-
-
-def _chosen(case: Any, request: ScenariosRequest) -> list[Scenario]:
-    chosen = chosen_of(case.file, request.names, request, cast("float | None", request.stop))
-    question((scenario.prepared for scenario in chosen), above=1)
-    return chosen
 
 
 def _designed(file: CaseFile, request: DesignRequest) -> ControllerDesign:
@@ -98,8 +69,6 @@ def _folder(given: str | Path) -> Path:
     return place
 
 
-scenario = method("Case.scenario", ScenarioRequest, _scenario)
-choose = method("Case.choose", ScenariosRequest, _chosen)
 sweep = of_study("sweep", SWEEP)
 screen = of_study("screen", SCREENING)
 site = of_study("site", SITING)
