@@ -18,6 +18,7 @@ from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.exporter import cached
 from fmus.toolchain.native_fmu import NativeFmu
 from fmus.toolchain.python_fmu import PythonFmu
+from orchestrator.core.late import import_xarray_alone
 from orchestrator.core.spelling import as_options
 from orchestrator.face.cli import main
 from tests.support import once
@@ -67,11 +68,12 @@ def pytest_xdist_auto_num_workers():
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection(session):
-    """The workers of a whole run share the work of compiling the tests."""
+    """The workers of a whole run share the work of compiling the tests, and import xarray without dask and pint."""
     worker = getattr(session.config, "workerinput", None)
     if worker and [Path(name).resolve() for name in session.config.args] == [TESTS]:
         number = int(worker["workerid"].removeprefix("gw"))
         chosen = session.config.option.markexpr
+        import_xarray_alone()  # or its first array would import both, which is 0.8 s of each worker
         import_share(number, worker["workercount"], lambda path: may_be_chosen(path, chosen))
 
 

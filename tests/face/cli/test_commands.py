@@ -7,6 +7,8 @@ import shlex
 import subprocess
 import sys
 import zipfile
+from contextlib import chdir, redirect_stderr, redirect_stdout
+from io import StringIO
 
 import fmpy
 import numpy as np
@@ -16,7 +18,7 @@ import xarray as xr
 from orchestrator.cases.case import load_case
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.sandbox import wine
-from orchestrator.face.cli import COMMANDS, GROUPS, OLD, QUESTIONS, _command_in, _parser
+from orchestrator.face.cli import COMMANDS, GROUPS, OLD, QUESTIONS, _command_in, _parser, main
 from tests.support.once import made_once
 from tests.support.scenarios import prepare_one
 from tests.systems.coupling.small_fmus import small_fmu
@@ -426,17 +428,11 @@ def results():
 
     def run(folder):
         command = ["run", "two_area", "--stop", "0.2", "--scenario", "pod_p", "--out", "results"]
-        done = subprocess.run(
-            [sys.executable, "-m", "orchestrator.face.cli", *command],
-            capture_output=True,
-            text=True,
-            check=False,
-            cwd=folder,
-        )
-        assert done.returncode == 0
-        (question,) = done.stderr.splitlines()
-        assert "the event at 1 s never happens, as the run stops at 0.2 s" in question
-        (folder / "printed.txt").write_text(done.stdout, encoding="utf-8")
+        printed, said = StringIO(), StringIO()
+        with chdir(folder), redirect_stdout(printed), redirect_stderr(said):
+            assert main(command) == 0
+        assert "the event at 1 s never happens, as the run stops at 0.2 s" in said.getvalue()
+        (folder / "printed.txt").write_text(printed.getvalue(), encoding="utf-8")
 
     folder = made_once("run_of_commands", run)
     return folder / "results", (folder / "printed.txt").read_text(encoding="utf-8")

@@ -23,6 +23,7 @@ from orchestrator.face.cli import run as command
 from orchestrator.output.results import recording_writer
 from orchestrator.output.results.manifest import read_manifest
 from orchestrator.systems.coupling.observers import Progress
+from tests.support.undrawn import UNDRAWN
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -190,12 +191,12 @@ def words_of_any_script(tmp_path):
     text = load_case("infinite_bus").text.replace('title = "', 'title = "Überlast λ 😀 ', 1)
     case.write_text(text, encoding="utf-8")
     own = (str(case), "--out", str(tmp_path), "--json")
-    return ["run", *own, "--scenario", "dip", "--stop", "1.2"]
+    return ["run", *own, "--scenario", "dip", "--stop", "0.1"]
 
 
 def test_a_terminal_that_lacks_most_characters(words_of_any_script):
     done = subprocess.run(
-        [sys.executable, "-m", "orchestrator.face.cli", *words_of_any_script],
+        [*UNDRAWN, *words_of_any_script],
         capture_output=True,
         check=False,
         env={**os.environ, "PYTHONIOENCODING": "ascii"},
@@ -280,7 +281,7 @@ def test_rows_through_a_low_pass_filter(gfor, tmp_path):
     runs = []
     for case in (plain, filtered):
         assert (
-            gfor("run", case, "--scenario", "dip", "--stop", "3", "--out", tmp_path / case.stem)[0]
+            gfor("run", case, "--scenario", "dip", "--stop", "2", "--out", tmp_path / case.stem)[0]
             == 0
         )
         runs.append(xr.load_dataset(tmp_path / case.stem / "dip" / "trajectory.nc"))

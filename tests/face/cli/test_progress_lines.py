@@ -93,7 +93,7 @@ def test_a_page_that_is_saved_tells_how_far_it_is(often, tmp_path, capsys, monke
 @pytest.mark.parametrize(
     ("name", "asked"),
     [
-        ("sweep", ["two_area", "--vary", "grid.X_L=0.1:0.2:5", "--scenario", "gfor"]),
+        ("sweep", ["two_area_rms", "--vary=grid.X_L=0.1:0.2:5", "--scenario=gfor", "--workers=1"]),
         ("site", ["two_area_rms", "--scenario", "gfor", "--confirm", "1"]),
     ],
 )

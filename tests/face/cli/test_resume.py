@@ -34,11 +34,11 @@ scale = {scale}
 """
 
 
-TIMES = (0.5, 1.7, 1.7005, 2.3333, 2.6)
+TIMES = (0.2, 0.7, 0.7005, 0.9333, 1.1)
 SCALES = (1.05, 0.98, 0.97, 1.0, 1.02)
 
 
-def write_case(path, stop=3.0, times=TIMES):
+def write_case(path, stop=1.25, times=TIMES):
     """The two areas, five events, short, to be ended at any moment."""
     text = (BUILT_IN / "two_area" / "case.toml").read_text(encoding="utf-8")
     head, _, tail = text.partition("[[events]]")
@@ -118,7 +118,7 @@ WORDS = ("--scenario", "gfor", "--scenario", "pod_pq")
 def undisturbed(case, warm, tmp_path_factory):
     folder = tmp_path_factory.mktemp("undisturbed")
     begun = time.monotonic()
-    finished(folder / "tmp", case, *WORDS, "--out", folder / "out", drawn=True, warm=warm)
+    finished(folder / "tmp", case, *WORDS, "--out", folder / "out", warm=warm)
     return folder / "out", time.monotonic() - begun
 
 
@@ -140,14 +140,14 @@ def stopped_at_random(process, folder, longest, number):
 @pytest.mark.slow
 @pytest.mark.parametrize("attempt", range(5))
 def test_a_killed_run_goes_on_to_the_last_bit(case, undisturbed, warm, tmp_path, attempt):
-    """The first attempt has pictures. What goes on is a process from its very beginning."""
-    out, drawn = tmp_path / "out", attempt == 0
+    """What goes on is a process from its very beginning."""
+    out = tmp_path / "out"
     words = (case, *WORDS, "--out", out, "--checkpoint", "0.05")
-    process = started(tmp_path / "tmp", *words, drawn=drawn, warm=warm)
+    process = started(tmp_path / "tmp", *words, warm=warm)
     stopped_at_random(process, out, undisturbed[1], signal.SIGKILL)
     if process.returncode == -signal.SIGKILL and (out / ".checkpoints").exists():
-        finished(tmp_path / "tmp", "--resume", out, drawn=drawn)
-    assert values_of(out, drawn=drawn) == values_of(undisturbed[0], drawn=drawn)
+        finished(tmp_path / "tmp", "--resume", out)
+    assert values_of(out) == values_of(undisturbed[0])
     assert not (out / ".checkpoints").exists()
 
 
@@ -171,22 +171,23 @@ def test_sigterm_leaves_nothing_behind_and_the_run_goes_on(
 
 
 @pytest.mark.slow
-def test_a_killed_run_on_several_threads_goes_on_with_another_number_of_them(case, warm, tmp_path):
+def test_a_killed_run_on_several_threads_goes_on_with_another_number_of_them(warm, tmp_path):
+    """And with pictures, which are the same as well."""
+    case = write_case(tmp_path / "events.toml", stop=3.0)
     words = (case, "--native", "--scenario", "pod_pq", "--threads")
-    finished(tmp_path / "tmp", *words, 1, "--out", tmp_path / "whole", warm=warm)
+    finished(tmp_path / "tmp", *words, 1, "--out", tmp_path / "whole", drawn=True, warm=warm)
     out = tmp_path / "out"
     process = started(tmp_path / "tmp", *words, 3, "--out", out, "--checkpoint", "0.01", warm=warm)
     stopped_at_random(process, out, 0.1, signal.SIGKILL)
     assert process.returncode == -signal.SIGKILL
-    assert "it goes on from t = " in finished(
-        tmp_path / "tmp", "--resume", out, "--threads", 2, warm=warm
-    )
-    assert values_of(out) == values_of(tmp_path / "whole")
+    words = ("--resume", out, "--threads", 2)
+    assert "it goes on from t = " in finished(tmp_path / "tmp", *words, drawn=True, warm=warm)
+    assert values_of(out, drawn=True) == values_of(tmp_path / "whole", drawn=True)
 
 
 @pytest.mark.slow
 def test_a_run_killed_before_its_first_checkpoint_says_that_it_begins_anew(warm, tmp_path):
-    words, out = ("infinite_bus", "--scenario", "dip"), tmp_path / "out"
+    words, out = ("infinite_bus", "--scenario", "dip", "--stop", "1.5"), tmp_path / "out"
     process = started(tmp_path / "tmp", *words, "--out", out, "--checkpoint", "600", warm=warm)
     while not (out / ".checkpoints" / "request.json").exists() and process.poll() is None:
         time.sleep(0.001)
@@ -199,28 +200,19 @@ def test_a_run_killed_before_its_first_checkpoint_says_that_it_begins_anew(warm,
 
 
 @pytest.mark.slow
-def test_an_isolated_fmu_goes_on_in_a_new_process(case, warm, tmp_path):
-    text = case.read_text(encoding="utf-8")
+def test_an_isolated_fmu_goes_on_in_a_new_process(warm, tmp_path):
+    text = (BUILT_IN / "infinite_bus" / "case.toml").read_text(encoding="utf-8")
     own = tmp_path / "isolated.toml"
     own.write_text(
         text.replace("[components.gfor]\n", "[components.gfor]\nisolated = true\n"),
         encoding="utf-8",
     )
     assert own.read_text(encoding="utf-8") != text
-    finished(tmp_path / "tmp", own, "--scenario", "pod_p", "--out", tmp_path / "whole", warm=warm)
+    words = (own, "--scenario", "dip", "--stop", "2", "--out")
+    finished(tmp_path / "tmp", *words, tmp_path / "whole", warm=warm)
     out = tmp_path / "out"
-    process = started(
-        tmp_path / "tmp",
-        own,
-        "--scenario",
-        "pod_p",
-        "--out",
-        out,
-        "--checkpoint",
-        "0.05",
-        warm=warm,
-    )
-    _, error = stopped_at_random(process, out, 1.0, signal.SIGTERM)
+    process = started(tmp_path / "tmp", *words, out, "--checkpoint", "0.02", warm=warm)
+    _, error = stopped_at_random(process, out, 0.2, signal.SIGTERM)
     assert process.returncode == 143, error
     assert list((tmp_path / "tmp").iterdir()) == []
     assert "gfor run --resume" in error

@@ -155,7 +155,7 @@ def test_a_killed_command_takes_its_copies_along_and_goes_on(case, warm, tmp_pat
 
 @pytest.fixture(scope="module")
 def case(tmp_path_factory):
-    return write_case(tmp_path_factory.mktemp("case") / "events.toml")
+    return write_case(tmp_path_factory.mktemp("case") / "events.toml", stop=3.0)
 
 
 # -- the copies themselves -----------------------------------------------------------------------------

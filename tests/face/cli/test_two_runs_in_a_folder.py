@@ -106,7 +106,7 @@ class Loses(Progress):
     done = False
 
     def observe(self, run):
-        if run.time > 0.9 and not self.done:
+        if run.time > 0.1 and not self.done:
             self.done = True
             (folder,) = self.out.glob("dip.part-*/recording")
             shutil.rmtree(folder)
@@ -121,10 +121,10 @@ def test_rows_that_are_not_the_runs_are_not_published(gfor, monkeypatch, tmp_pat
     monkeypatch.setattr(Loses, "out", tmp_path / "out", raising=False)
     source = tmp_path / "other" / "dip" / "trajectory.nc" if planted else None
     monkeypatch.setattr(Loses, "planted", source, raising=False)
-    monkeypatch.setattr(command, "Progress", Loses)
+    monkeypatch.setattr(command, "Progress", lambda report: Loses(report, 500))
     monkeypatch.setattr("orchestrator.systems.coupling.recording_blocks.BLOCK_ROWS", 8)
     monkeypatch.setattr("orchestrator.systems.coupling.recording_blocks._FEWEST_ROWS", 8)
-    words = ("run", "infinite_bus", "--scenario", "dip", "--stop", "1")
+    words = ("run", "infinite_bus", "--scenario", "dip", "--stop", "0.2")
     code, _, error = gfor(*words, "--out", tmp_path / "out")
     assert not (tmp_path / "out" / "dip").exists()
     assert code == 1
