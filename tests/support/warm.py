@@ -100,6 +100,11 @@ class Warm:
         socket.send_fds(line, [json.dumps(asked).encode()], outputs)
         return Ran(line, outputs, self.address)
 
+    def use_one_core(self) -> None:
+        """Let the commands find one core where there are several: a study then has no processes of its own."""
+        if hasattr(os, "sched_setaffinity"):
+            os.sched_setaffinity(self._parent.pid, {max(os.sched_getaffinity(0))})
+
     def close(self) -> None:
         assert self._parent.stdin is not None
         self._parent.stdin.close()
@@ -192,6 +197,7 @@ def _become(asked: dict) -> None:
     os.environ.clear()
     os.environ.update(asked["env"])
     os.chdir(asked["folder"])
+    sys.path += filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))
     tempfile.tempdir = None
     sys.argv = ["gfor", *asked["words"]]
     if not asked["drawn"]:

@@ -12,7 +12,7 @@ import sys
 def main() -> int:
     line = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     line.connect(sys.argv[1])
-    asked = {"words": sys.argv[2:], "env": dict(os.environ), "drawn": True, "folder": os.getcwd()}
+    asked = {"words": sys.argv[2:], "env": dict(os.environ), "drawn": False, "folder": os.getcwd()}
     socket.send_fds(line, [json.dumps(asked).encode()], [1, 2])
     line.recv(64)  # its number
     code = int(line.recv(64).split()[0])
