@@ -13,6 +13,7 @@ import pytest
 from tests.pages.markdown import ROOT, blocks
 
 PAGE = ROOT / ".docs" / "validation" / "errors-in-silence.md"
+pytestmark = pytest.mark.usefixtures("undrawn")  # what a command says is looked at
 TITLES = re.findall(r"^## (.*)$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
 
 
