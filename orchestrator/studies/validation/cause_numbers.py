@@ -5,12 +5,17 @@ phase all the way."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from orchestrator.core.arrays import Numbers
 from orchestrator.devices.fmi.description import VariableInfo
-from orchestrator.studies.validation.cause_bench import CauseBench, Responses, squares_of
+from orchestrator.studies.validation.cause_bench import (
+    CauseBench,
+    Responses,
+    Values,
+    squares_of,
+)
 from orchestrator.studies.validation.causes import CauseKind, Explanation
 from orchestrator.studies.validation.parameters import Adjustable, adjustable
 
@@ -40,10 +45,11 @@ def numbers_by_slope(
     bench: CauseBench, rough: CauseBench, promises: Sequence[Promise]
 ) -> Iterator[Explanation]:
     """The numbers that promise the most, each followed by itself to where it leaves the least."""
-    ordered = sorted(promises, key=lambda one: -one.gain(rough.error))
-    for one in ordered[:_FOLLOWED]:
-        bench.report(f"following {one.number.name}")
-        yield _confirmed(bench, rough, one.number, follow(rough, one))
+    ordered = sorted(promises, key=lambda one: -one.gain(rough.error))[:_FOLLOWED]
+    followed = [
+        (one.number, _Place(one.number.start, rough.error, one.slope), "") for one in ordered
+    ]
+    yield from _followed(bench, rough, followed)
 
 
 def promises_of(
@@ -80,7 +86,35 @@ def follow(
 
     ``others``: numbers that have the same value all along."""
     begin = _Place(promise.number.start, bench.error, promise.slope)
-    return _best_from(bench, promise.number, begin, others)
+    (best,) = _ends_of(bench, [_way_to_best(bench, promise.number, begin, others)])
+    return best
+
+
+Way = Generator[Values, Responses | None, tuple[float, Numbers]]
+"""A number on its way to the value that leaves the least: it asks for responses, and ends with the value and errors."""
+
+
+def _ends_of(bench: CauseBench, ways: Sequence[Way]) -> list[tuple[float, Numbers]]:
+    """Where some ways end, which go on side by side: what all of them ask for next may be made at once."""
+    ends: dict[int, tuple[float, Numbers]] = {}
+    asked: dict[int, Values] = {}
+
+    def go_on(number: int, found: Responses | None) -> None:
+        """Let a way go on with what it asked for until it asks again; ``None`` lets it begin as well."""
+        try:
+            asked[number] = ways[number].send(found)
+        except StopIteration as end:
+            ends[number] = end.value
+
+    for number in range(len(ways)):
+        go_on(number, None)
+    while asked:
+        now = asked.copy()
+        asked.clear()
+        bench.announce(now.values())
+        for number, values in now.items():
+            go_on(number, bench.responses(values))
+    return [ends[number] for number in range(len(ways))]
 
 
 @dataclass(frozen=True)
@@ -92,9 +126,9 @@ class _Place:
     slope: Numbers
 
 
-def _best_from(
+def _way_to_best(
     bench: CauseBench, number: Adjustable, begin: _Place, others: Sequence[str] = ()
-) -> tuple[float, Numbers]:
+) -> Way:
     """The best value of a number, by Gauss and Newton with secants for slopes."""
     at, error, slope = begin.value, begin.error, begin.slope
     size = squares_of(slope)
@@ -102,7 +136,7 @@ def _best_from(
     for _ in range(_MOST_STEPS):
         value = min(max(at + way, number.low), number.high)
         moved = dict.fromkeys((number.name, *others), value)
-        found = bench.responses(moved) if value != at else None
+        found = (yield moved) if value != at else None
         here = None if found is None else bench.errors(found)
         gained = -1.0 if here is None else float(error @ error - here @ here)
         if here is None or gained < 0:
@@ -138,10 +172,9 @@ def numbers_by_factors(
         if places:
             best = min(places, key=lambda one: squares_of(one.error))
             found.append((squares_of(best.error), number, best))
-    for _, number, place in sorted(found, key=lambda one: one[0])[:_FOLLOWED_FAR]:
-        bench.report(f"following {number.name} from {place.value:.4g}")
-        value, left = _best_from(rough, number, place)
-        yield _confirmed(bench, rough, number, (value, left))
+    likely = sorted(found, key=lambda one: one[0])[:_FOLLOWED_FAR]
+    followed = [(number, place, f" from {place.value:.4g}") for _, number, place in likely]
+    yield from _followed(bench, rough, followed)
 
 
 def _may_be(number: Adjustable, value: float) -> bool:
@@ -165,13 +198,28 @@ def _along_factors(rough: CauseBench, number: Adjustable, factor: float) -> Iter
         at, error = value, here
 
 
-def _confirmed(
-    bench: CauseBench, rough: CauseBench, number: Adjustable, best: tuple[float, Numbers]
-) -> Explanation:
-    """A number at its best value, with what the device leaves there in its own steps."""
-    value, left = best
-    found = None if rough is bench else bench.responses({number.name: value})
-    left = left if found is None else bench.errors(found)
-    return bench.explanation(
-        CauseKind.VALUE, number.name, number.start, value, left, unit=number.unit
-    )
+def _followed(
+    bench: CauseBench, rough: CauseBench, followed: Sequence[tuple[Adjustable, _Place, str]]
+) -> Iterator[Explanation]:
+    """Numbers at their best values, with what the device leaves there in its own steps.
+
+    ``followed``: each with the place from which it is followed, and how that is said."""
+    ways = []
+    for number, place, said in followed:
+        bench.report(f"following {number.name}{said}")
+        ways.append(_way_to_best(rough, number, place))
+    best = _ends_of(rough, ways)
+    if rough is not bench:
+        bench.announce(
+            {one.name: value} for (one, _, _), (value, _) in zip(followed, best, strict=True)
+        )
+    for (number, _, _), (value, left) in zip(followed, best, strict=True):
+        found = None if rough is bench else bench.responses({number.name: value})
+        yield bench.explanation(
+            CauseKind.VALUE,
+            number.name,
+            number.start,
+            value,
+            left if found is None else bench.errors(found),
+            unit=number.unit,
+        )

@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 import orchestrator as gfor_in_python
-from orchestrator.studies.validation.cause_numbers import Promise, numbers_by_factors
+from orchestrator.studies.validation.cause_numbers import (
+    Promise,
+    numbers_by_factors,
+    numbers_by_slope,
+)
 from orchestrator.studies.validation.causes import CauseKind, Explanation, without_worse_ways
 from orchestrator.studies.validation.hidden import HiddenPart
 from orchestrator.studies.validation.lagged import lag_alone
@@ -141,6 +145,43 @@ def test_doublings_lead_where_no_slope_does():
     assert bench.asked[:4] == [0.5, 2.0, 4.0, 8.0]
     low = replace(number, high=1.9, low=0.6)
     assert list(numbers_by_factors(bench, bench, [replace(promise, number=low)])) == []
+
+
+class Valleys:
+    """A bench whose error has one valley for each number; what is asked for at once is noted."""
+
+    def __init__(self, best):
+        self.best = best
+        self.error = np.array(list(best.values())) - 1.0
+        self.base, self.idle, self.announced = [], [], []
+
+    def report(self, text):
+        pass
+
+    def announce(self, each):
+        self.announced.append([name for values in each for name in values])
+
+    def responses(self, values):
+        return [np.array([values.get(name, 1.0) for name in self.best])]
+
+    def errors(self, responses):
+        moved = np.array(list(self.best.values())) - responses[0]
+        return moved + 0.1 * moved**2
+
+    def explanation(self, cause, name, now, value, left, *, unit):
+        return Explanation(cause, name, unit, now, value, 1.0, float(np.sqrt(left @ left)))
+
+
+def test_numbers_are_followed_side_by_side_each_to_its_own_best_value():
+    best = {"x": 1.3, "y": 0.8, "z": 1.0}
+    bench = Valleys(best)
+    promises = [
+        Promise(Adjustable(name, "s", start=1.0, low=0.1, high=16.0), [], -np.eye(3)[k])
+        for k, name in enumerate(best)
+    ]
+    found = {one.name: one.value for one in numbers_by_slope(bench, bench, promises)}
+    assert found == pytest.approx(best, abs=0.02)
+    assert bench.announced[0] == ["x", "y"]  # z is where it leaves the least
 
 
 def test_a_cause_that_leaves_clearly_more_than_the_first_explains_nothing():
