@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -22,7 +23,7 @@ from orchestrator.studies.validation.averaging import averaged
 from orchestrator.studies.validation.held_in_step import hold_at_once, hold_in_step, steps_held
 from orchestrator.studies.validation.instances import InstanceRun, InstanceShelf
 from orchestrator.studies.validation.over_limit import OverLimit, limit_outputs, over_limit
-from orchestrator.studies.validation.record import Recording
+from orchestrator.studies.validation.record import SHORT_STEP, Driving, Recording
 from orchestrator.studies.validation.side_by_side import (
     AskingRun,
     StepsAsked,
@@ -38,14 +39,16 @@ _IN_PHASOR = np.array([1.0, 1j])  # of a row of two components
 _STARTS = ("P_0", "Q_0", "v_0", "theta_0")
 _STILL = 1e-4  # movement of the current in a round [pu of the rating] at which a device is at rest
 _ROUND = 0.5  # time [s] for which it is looked at
-_SHORT_STEP = 1e-4  # communication step [s] of a coupled run, whose held voltage is late by nothing that matters
 _ROUGH_STEP = (
     5e-4  # communication step [s] for a first look: half the time of a run in steps of 100 us
 )
 _PROBE_STEPS = 200  # that move most states of a device
 _PROBE_JUMP = 0.95 + 0.05j  # of the voltage, in magnitude and angle
 _LONGEST_REST = 20.0  # time [s] after which it is driven, at rest or not
-_FEWEST = 3  # plays that are sooner made side by side than one by one
+_MOST_SAMPLES = 2_000_000  # of the outcomes of plays that are kept, 32 MB
+_FEWEST = 4
+"""Plays that are sooner made side by side than one by one: eight lanes take as long as 3.2 of our EMT converter alone,
+and as long as 4 of that of phasors, whether all are used or not."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +101,17 @@ class Play:
         mine, others = ((one.device, one.start) for one in (self, other))
         return self.recording is other.recording and mine == others
 
+    def answers_as(self, other: Play) -> bool:
+        """Return whether both give the same, by recordings that drive the device alike."""
+        if (self.device, self.start) != (other.device, other.start):
+            return False
+        mine, others = self.recording, other.recording
+        if mine is others:
+            return True
+        if self.device.gives_way and not mine.measured_as(others):
+            return False
+        return mine.drives_as(others)
+
     @property
     def goes_beside(self) -> bool:
         """Return whether it can be made beside others: the voltage does not turn with it, and it runs in here."""
@@ -129,6 +143,47 @@ class AnnouncedPlays:
         return None
 
 
+class MadePlays:
+    """The outcomes of plays between `keeping` and its end, inside which none is made twice.
+
+    A search comes back to where it was: to the device as it is given for each of its parts, and to the best values."""
+
+    def __init__(self) -> None:
+        self._known: dict[frozenset[tuple[str, float | bool]], list[tuple[Play, Played]]] = {}
+        self._samples = 0
+        self._keeps = False
+
+    @contextmanager
+    def keeping(self) -> Iterator[None]:
+        """Inside ``with``, outcomes are kept; at its end they are forgotten."""
+        self._keeps = True
+        try:
+            yield
+        finally:
+            self._keeps = False
+            self._forget()
+
+    def find(self, play: Play) -> Played | None:
+        """The outcome of a play that was made before; None of another one."""
+        if not self._keeps:
+            return None
+        known = self._known.get(frozenset(play.device.values.items()), ())
+        return next((made for one, made in known if one.answers_as(play)), None)
+
+    def keep(self, play: Play, made: Played) -> None:
+        """Keep an outcome, if need be in place of all others."""
+        if not self._keeps:
+            return
+        if self._samples + len(made.power) > _MOST_SAMPLES:
+            self._forget()
+        self._samples += len(made.power)
+        self._known.setdefault(frozenset(play.device.values.items()), []).append((play, made))
+
+    def _forget(self) -> None:
+        self._known.clear()
+        self._samples = 0
+
+
 @dataclass(frozen=True)
 class PlayedDevice:
     """A device with its values, at a port of ours."""
@@ -145,6 +200,7 @@ class PlayedDevice:
     shelf: InstanceShelf = field(default_factory=InstanceShelf, compare=False)
     trials: TrialLog = field(default_factory=TrialLog, compare=False)  # that it refused
     announced: AnnouncedPlays = field(default_factory=AnnouncedPlays, compare=False)
+    made: MadePlays = field(default_factory=MadePlays, compare=False)
 
     @property
     def path(self) -> Path:
@@ -200,9 +256,14 @@ class PlayedDevice:
         The voltage of a step is that at its begin, as in a coupled run. A longer step takes the mean of what such short
         steps would hold, and its end what the last of them would: that at its begin alone would be late by half of it
         in what a device integrates, and by all of it in what follows the voltage at once."""
-        made = self.announced.take(Play(self, recording, start))
-        if made is not None:
-            return made
+        play = Play(self, recording, start)
+        made = self.made.find(play)
+        if made is None:
+            made = self.announced.take(play) or self._play_alone(recording, start)
+            self.made.keep(play, made)
+        return made
+
+    def _play_alone(self, recording: Recording, start: OperatingStart) -> Played:
         values = self._values_at(start)
         run = InstanceRun(
             self.description,
@@ -220,7 +281,7 @@ class PlayedDevice:
 
         They are then made side by side where they can be, each with the bits that it has alone. What was announced
         before is forgotten."""
-        self.announced.renew(plays)
+        self.announced.renew([one for one in plays if self.made.find(one) is None])
 
     def asking_run(
         self, component: Component, recording: Recording, start: OperatingStart
@@ -269,7 +330,7 @@ class PlayedDevice:
         No longer one than a coupled run has: what is measured is of its own time."""
         info = self.description.variables.get(STEP_PARAMETER)
         known = info is not None and info.causality == "parameter"
-        return {STEP_PARAMETER: min(self.step_size, _SHORT_STEP)} if known else {}
+        return {STEP_PARAMETER: min(self.step_size, SHORT_STEP)} if known else {}
 
     def _start_values(self, start: OperatingStart) -> dict[str, float]:
         """The power flow's values of a device; those that it does not know are left out."""
@@ -314,29 +375,27 @@ class PlayedDevice:
         """Power at the recording's times [pu of the rating], as means over as long as the recording's.
 
         And where the current is above a limit that the device lacks, unless the voltage turns with it."""
-        steps = int(np.ceil(recording.length / self.step_size - 1e-9))
-        times: Numbers = np.asarray(self.step_size * np.arange(steps + 1))
-        voltage = recording.at(times)
-        held = self._step_voltages(recording, steps)
+        driving = recording.driving_in(self.step_size)
+        held = driving.held
         index = len(before) - 1
         scale = SYSTEM_BASE_MVA / self.rating
-        turn: Numbers = np.zeros(steps + 1)
+        turn: Numbers = np.zeros(len(held) + 1)
         over = None
         if self.gives_way:
-            currents, turn[1:] = self._held_in_step(component, recording, held, index)
+            currents, turn[1:] = self._held_in_step(component, recording, driving, index)
         else:
             late = _columns(held[:, -1]) if held.shape[1] > 1 else None
-            inputs = _columns(held.mean(axis=1))
+            inputs = _columns(driving.means)
             outputs = yield StepsAsked(self._names, inputs, self.step_size, index, late)
             currents = outputs[:, :2] @ _IN_PHASOR
             over = over_limit(outputs[:, 2], self.step_size) if outputs.shape[1] > 2 else None
         currents = np.concatenate([before[-1:] @ _IN_PHASOR, currents])
-        power = voltage * currents.conj() * scale + turn
-        means = averaged(times, power, recording.average, recording.times, recording.ahead)
+        power = driving.voltage * currents.conj() * scale + turn
+        means = averaged(driving.times, power, recording.average, recording.times, recording.ahead)
         return means, over
 
     def _held_in_step(
-        self, component: Component, recording: Recording, held: Complex, index: int
+        self, component: Component, recording: Recording, driving: Driving, index: int
     ) -> tuple[Complex, Numbers]:
         """Currents while the voltage turns with them, and the turn as power [pu of the rating]."""
         scale = SYSTEM_BASE_MVA / self.rating
@@ -349,9 +408,9 @@ class PlayedDevice:
 
         good = recording.good
         current: Complex = np.conj(recording.power[good] / recording.voltage[good])
-        ends: Numbers = np.asarray(self.step_size * np.arange(1, len(held) + 1))
+        ends: Numbers = np.asarray(self.step_size * np.arange(1, len(driving.held) + 1))
         measured: Complex = np.interp(ends, recording.times[good], current)
-        voltage = held.mean(axis=1), held[:, -1]
+        voltage = driving.means, driving.held[:, -1]
         if stretches.turns_at_once:
             run = hold_at_once(stretches, voltage, measured, self.step_size, scale)
         else:
@@ -362,12 +421,6 @@ class PlayedDevice:
     def _names(self) -> tuple[Sequence[str], Sequence[str]]:
         """Names of the inputs and of the outputs of a run."""
         return _VOLTAGE, (*_CURRENT, *limit_outputs(self.description))
-
-    def _step_voltages(self, recording: Recording, steps: int) -> Complex:
-        """The voltages that short steps in each step would hold, shape (steps, short steps in one)."""
-        parts = max(1, int(np.ceil(self.step_size / _SHORT_STEP - 1e-9)))
-        times: Numbers = np.asarray(self.step_size / parts * np.arange(steps * parts))
-        return np.asarray(recording.at(times).reshape(steps, parts))
 
 
 def _columns(values: Complex) -> Numbers:

@@ -35,6 +35,10 @@ from orchestrator.studies.validation.transformer import AT_PORT, Between, Beyond
 if TYPE_CHECKING:
     import xarray as xr
 
+SHORT_STEP = 1e-4
+"""Communication step [s] of a coupled run, whose held voltage is late by nothing that matters."""
+
+_MOST_KEPT = 100_000  # voltages of short steps, 1.6 MB, that a recording keeps
 LEAST_VOLTAGE = 1e-3  # [pu] by which a power is divided for its current
 _FEWEST = 20  # samples of a recording that can be compared with anything
 _LONGEST_GAP = 0.25  # gap [s] that a straight line bridges in the voltage that drives the device
@@ -105,6 +109,10 @@ class Recording:
     jumps: Mapping[int, float] = field(default_factory=dict)
     sampled: Complex | None = None  # the power before it was averaged
     bends: bool = False  # whether a phasor runs along smooth curves between samples, and not along straight lines
+    # of a device by its communication step [s]; a changed recording begins without
+    driving: dict[float, Driving] = field(
+        init=False, default_factory=dict, compare=False, repr=False
+    )
 
     @property
     def times(self) -> Numbers:
@@ -145,6 +153,27 @@ class Recording:
         back = np.exp(-1j * _TURN * hertz * self.times)
         return replace(self, voltage=self.voltage * back, frame_hz=self.frame_hz + hertz)
 
+    def drives_as(self, other: Recording) -> bool:
+        """Return whether a device answers both alike: what was measured of its power is not looked at."""
+        mine, others = (
+            (one.interval, one.instantaneous, one.average, one.jumps, one.bends)
+            for one in (self, other)
+        )
+        return mine == others and np.array_equal(self.voltage, other.voltage)
+
+    def measured_as(self, other: Recording) -> bool:
+        """Return whether both hold the same power, and where it is known."""
+        return np.array_equal(self.power, other.power) and np.array_equal(self.good, other.good)
+
+    def driving_in(self, step_size: float) -> Driving:
+        """The voltage for the steps of a device; of a recording that is not long, made once."""
+        known = self.driving.get(step_size)
+        if known is None:
+            known = Driving.of(self, step_size)
+            if known.held.size <= _MOST_KEPT:
+                self.driving[step_size] = known
+        return known
+
     def at(self, times: Numbers) -> Complex:
         """The voltage between samples: instantaneous values along straight lines, phasors by magnitude and angle."""
         for sample, part in self.jumps.items():
@@ -159,6 +188,32 @@ class Recording:
         along = _along_cubics if self.bends else np.interp
         magnitude = along(times, self.times, np.abs(self.voltage))
         return np.asarray(magnitude * np.exp(1j * along(times, self.times, angle)))
+
+
+@dataclass(frozen=True)
+class Driving:
+    """A recorded voltage for the communication steps of a device.
+
+    ``times``: of the steps' begins and of the last one's end [s]; ``voltage``: at these; ``held``: what short steps in
+    each step would hold, shape (steps, short steps in one)."""
+
+    times: Numbers
+    voltage: Complex
+    held: Complex
+
+    @classmethod
+    def of(cls, recording: Recording, step_size: float) -> Driving:
+        steps = int(np.ceil(recording.length / step_size - 1e-9))
+        times: Numbers = np.asarray(step_size * np.arange(steps + 1))
+        parts = max(1, int(np.ceil(step_size / SHORT_STEP - 1e-9)))
+        short: Numbers = np.asarray(step_size / parts * np.arange(steps * parts))
+        held = np.asarray(recording.at(short).reshape(steps, parts))
+        return cls(times, recording.at(times), held)
+
+    @cached_property
+    def means(self) -> Complex:
+        """Means of what short steps hold, one for each step."""
+        return np.asarray(self.held.mean(axis=1))
 
 
 def _along_cubics(times: Numbers, known: Numbers, values: Numbers) -> Numbers:

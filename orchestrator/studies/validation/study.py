@@ -221,6 +221,7 @@ def validate_device(
     with ExitStack() as kept:
         for device in filter(None, (request.device, request.beside)):
             kept.enter_context(device.shelf.keeping())
+            kept.enter_context(device.made.keeping())
         kept.enter_context(one_thread())  # matrices are small, and other threads would only wait
         return _validate(request, report)
 

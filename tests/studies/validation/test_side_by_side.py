@@ -73,7 +73,7 @@ def plays_of(device, droops=DROOPS):
 
 @pytest.mark.parametrize(
     ("model", "step", "count", "groups"),
-    [("gfor", 1e-4, 3, [3]), ("gfor", 5e-4, 4, [4]), ("gfor_phasor", 1e-3, 11, [8, 3])],
+    [("gfor", 1e-4, 4, [4]), ("gfor", 5e-4, 5, [5]), ("gfor_phasor", 1e-3, 11, [8])],
 )
 def test_they_are_the_same_to_the_last_bit(model, step, count, groups, made):
     device = face._alone(model, None, {"S_n": 100.0}, step)
@@ -145,21 +145,21 @@ def test_what_is_asked_for_in_another_order_or_not_at_all_is_the_same(made):
 
 def test_nothing_is_made_ahead_where_instances_are_not_kept_or_too_few_or_give_way(made, opened):
     device = face._alone("gfor_phasor", None, {"S_n": 100.0}, 1e-3)
-    three = plays_of(device, DROOPS[:3])
-    device.announce(three)
-    outcome(three[0])
+    four = plays_of(device, DROOPS[:4])
+    device.announce(four)
+    outcome(four[0])
     with device.shelf.keeping():
-        device.announce(three[:2])
-        outcome(three[0])
-        device.announce([replace(one, device=one.device.in_step) for one in three])
-        outcome(replace(three[0], device=three[0].device.in_step))
+        device.announce(four[:3])
+        outcome(four[0])
+        device.announce([replace(one, device=one.device.in_step) for one in four])
+        outcome(replace(four[0], device=four[0].device.in_step))
     assert made == []
     assert len(opened) == 2
 
 
 def test_a_strangers_fmu_is_stepped_alone(made, tmp_path):
     device, seen = stranger(tmp_path), event()
-    values = [{"R_f": droop} for droop in (0.02, 0.05, 0.04)]
+    values = [{"R_f": droop} for droop in (0.02, 0.05, 0.04, 0.03)]
     plays = [Play(device.with_values(x), seen.recording, seen.start) for x in values]
     alone, beside = both_ways(device, plays)
     assert made == []
