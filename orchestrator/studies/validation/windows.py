@@ -360,7 +360,9 @@ def _corners(signal: Complex, begin: int, lag: int, interval: float) -> list[int
     begins = begin + 2 * lag + width
     ends = min(begin + round(_LONGEST_EVENT / interval) + lag, len(bends) - far)
     found = []
-    for at in begins + far + np.flatnonzero(bends[begins + far : max(ends, 0)] > least):
+    above = begins + far + np.flatnonzero(bends[begins + far : max(ends, 0)] > least)
+    peak = (bends[above] >= bends[above - 1]) & (bends[above] >= bends[above + 1])
+    for at in above[peak]:
         near = bends[at - lag : at + lag + 1]
         beside = max(bends[at - far : at - aside].max(), bends[at + aside : at + far].max())
         if bends[at] == near.max() and bends[at] > _STANDS_OUT * beside:
