@@ -19,7 +19,6 @@ from tests.benchmarks.validation_draws import TRUTH, starts_of
 from tests.studies.validation.recordings import (
     of_pmu,
     phasor_plant,
-    run,
     table,
     with_noise,
     written,
@@ -106,10 +105,10 @@ def test_names_and_bounds_that_do_not_fit_are_refused_before_anything_is_driven(
 
 
 def test_three_parameters_are_found_from_a_start_at_which_the_ringing_is_out_of_phase():
-    frame = with_noise(table(run("pod_p", stop=4.5, gfor__pod_p__K=120.0)), 0).set_index("time")
+    frame = with_noise(phasor_plant(), 0).set_index("time")
     names = list(TRUTH)[:3]
     values = ON | starts_of(0, names)
-    found = gfor_in_python.validate("gfor", frame, values=values, fit=names, step=EMT_STEP)
+    found = gfor_in_python.validate(MODEL, frame, values=values, fit=names, step=STEP)
     assert found.result.fit.reached
     for row in found.fitted().itertuples():
         assert row.low < TRUTH[row.parameter] < row.high
