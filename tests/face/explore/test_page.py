@@ -105,9 +105,18 @@ def still_page(browser, two_area):
 
 @pytest.fixture
 def still(still_page):
-    """The page with a control of the gain, for tests that call its functions; afterwards it asks the server as ever."""
+    """The page with a control of the gain, for tests that call its functions; afterwards it is as it was before."""
+    still_page.evaluate("() => { window.before = [{ ...seen }, { ...state }]; }")
     yield still_page
-    still_page.evaluate("ask = asking")
+    still_page.evaluate(
+        """() => {
+            ask = asking;
+            [seen, state].forEach((now, k) => {
+                Object.keys(now).forEach(key => delete now[key]);
+                Object.assign(now, before[k]);
+            });
+        }"""
+    )
 
 
 def computed(view, count):
@@ -169,24 +178,18 @@ def test_map_table_and_verdict_are_those_of_the_command(view, capsys):
 
 
 @needs_chromium
-def test_a_scenario_is_compared_with_the_one_that_differs_least_besides_the_converter(
-    browser, two_area
-):
+def test_a_scenario_is_compared_with_the_one_that_differs_least_besides_the_converter(still):
     """Kundur's first scenario without a converter has another exciter as well."""
-    view = browser.new_page()
-    view.goto(two_area.address)
-    computed(view, 1)
     tables = load_case("kundur").table.scenarios
     systems = {name: table.model_dump_json() for name, table in tables.items()}
     compared = """systems => {
         Object.assign(seen, { systems, titles: systems }); state.scenario = "pod_q";
         return [converterApart(), differencesOf(converterApart(), "pod_q")];
     }"""
-    assert view.evaluate(compared, systems) == [
+    assert still.evaluate(compared, systems) == [
         "thyristor",
         ["units.alpha.1", "gfor1.pod_q.enabled"],
     ]
-    view.close()
 
 
 @needs_chromium
@@ -597,9 +600,9 @@ def test_a_drift_of_the_common_speed_is_told_as_one(still):
 
 
 @needs_chromium
-def test_questions_are_about_the_gain_that_moves_the_mode_most(view):
+def test_questions_are_about_the_gain_that_moves_the_mode_most(still):
     """The first by name once was, of a converter that has no part in the mode."""
-    asked = view.evaluate(
+    asked = still.evaluate(
         """() => {
             const one = name => ({ parameter: `${name}.pod_p.K`, variability: "tunable", value: 200, switches: [] });
             seen.info = { ...seen.info, parameters: ["gfor30", "gfor31", "gfor32"].map(one) };
