@@ -140,13 +140,13 @@ def stopped_at_random(process, folder, longest, number):
 @pytest.mark.slow
 @pytest.mark.parametrize("attempt", range(5))
 def test_a_killed_run_goes_on_to_the_last_bit(case, undisturbed, warm, tmp_path, attempt):
-    """What goes on is a process from its very beginning."""
+    """By night, what goes on is a process from its very beginning."""
     out = tmp_path / "out"
     words = (case, *WORDS, "--out", out, "--checkpoint", "0.05")
     process = started(tmp_path / "tmp", *words, warm=warm)
     stopped_at_random(process, out, undisturbed[1], signal.SIGKILL)
     if process.returncode == -signal.SIGKILL and (out / ".checkpoints").exists():
-        finished(tmp_path / "tmp", "--resume", out)
+        finished(tmp_path / "tmp", "--resume", out, warm=None if attempt else warm)
     assert values_of(out) == values_of(undisturbed[0])
     assert not (out / ".checkpoints").exists()
 
