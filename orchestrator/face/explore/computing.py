@@ -2,21 +2,24 @@
 
 import json
 import subprocess
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Mapping
 from itertools import count
+from pathlib import Path
 from typing import Any
 
+from fmus.toolchain.temporary import sweep
 from orchestrator.core.errors import ErrorKind
-from orchestrator.face.explore.copies import Copy, Process, begun
+from orchestrator.face.explore.copies import UNKNOWN, Copy, Process, begun
 
 Answer = dict[str, Any]
 
 Asker = tuple[str, str]  # a page, and the kind of its question
 LONGEST = 3600.0  # a computation that takes longer is ended [s]
 _RESTART = 3.0  # to start the process anew takes about so long [s]
-_TO_LEAVE = 3.0  # until a process that was asked to end is killed [s]
+_TO_LEAVE = 1.0  # until a process that was asked to end is killed [s]
 
 
 class Computing:
@@ -41,6 +44,7 @@ class Computing:
         self._process: Process | None = None
         self._why = ""
         self._closed = False
+        self._ending: list[threading.Thread] = []  # each sees to the end of a process
 
     def ask(self, page: str, question: Mapping[str, Any], say: Callable[[Answer], None]) -> Answer:
         """The answer; ``superseded`` where the page asked the same anew meanwhile, ``cancelled`` where it was ended."""
@@ -102,6 +106,11 @@ class Computing:
             self._end("closed")
             self._state.notify_all()
 
+    def wait_for_its_end(self) -> None:
+        """Wait until the processes that were asked to end have, or were killed."""
+        for thread in self._ending:
+            thread.join()
+
     def _answered(self, question: Mapping[str, Any], say: Callable[[Answer], None]) -> Answer:
         try:
             process = self._running()
@@ -132,6 +141,8 @@ class Computing:
             process.kill()
         code = process.wait() if process is not None else 0
         how = f"signal {-code}" if code < 0 else f"exit code {code}"
+        if isinstance(process, Copy) and code == UNKNOWN:
+            how = "how is not known"
         if self._why == "too long":
             return f"the computation took more than {self._longest:g} s and was ended; ask again with fewer values"
         text = (
@@ -158,7 +169,10 @@ class Computing:
             is_there = not isinstance(process, Copy) or process.is_there
             if is_there:
                 process.terminate()
-            threading.Thread(target=_killed, args=(process, is_there), daemon=True).start()
+            thread = threading.Thread(target=_killed, args=(process, is_there), daemon=True)
+            thread.start()
+            # nobody waits for one that is yet to be copied: it ends with the process it is made from
+            self._ending = [one for one in self._ending if one.is_alive()] + [thread] * is_there
 
 
 def _killed(process: Process, was_asked: bool) -> None:
@@ -170,3 +184,4 @@ def _killed(process: Process, was_asked: bool) -> None:
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
+        sweep(Path(tempfile.gettempdir()))  # its folders, which it could not remove

@@ -25,7 +25,7 @@ _NUMBER = 64
 """Bytes that hold the number of a process, or the code that it ended with."""
 _LOOK = 0.05
 """Longest between two looks at what is known [s]: what a thread waits for may be read by another one as it wakes up."""
-_UNKNOWN = 255
+UNKNOWN = 255
 """The code of a process of whose end nobody tells, because whoever watched it was ended as well."""
 
 
@@ -69,7 +69,7 @@ class Copy:
                 if self._pid == 0:
                     self._pid = int(told or b"-1")
                 else:
-                    self.returncode = int(told or _UNKNOWN)
+                    self.returncode = int(told or UNKNOWN)
 
     def poll(self) -> int | None:
         self._read_what_came()

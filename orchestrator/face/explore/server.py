@@ -4,6 +4,7 @@ import json
 import math
 import queue
 import secrets
+import sys
 import threading
 import time
 from functools import partial
@@ -48,7 +49,7 @@ class Explorer:
         self._pages: dict[str, queue.SimpleQueue[Answer]] = {}
         self._last_seen = float("inf")  # nobody was there yet
         try:
-            self._server = ThreadingHTTPServer((LOOPBACK, port), partial(_Handler, self))
+            self._server = _Server((LOOPBACK, port), partial(_Handler, self))
         except OSError as error:
             text = f"--port {port}: nothing can listen there: {error.strerror}; give another port, or none"
             raise InputError(text) from error
@@ -74,6 +75,8 @@ class Explorer:
         self._server.server_close()
         for computing in self.computing.values():
             computing.close()
+        for computing in self.computing.values():
+            computing.wait_for_its_end()
 
     def opened(self, page: str) -> "queue.SimpleQueue[Answer]":
         self._last_seen = time.monotonic()
@@ -104,6 +107,17 @@ class Explorer:
         return computing.ask(
             page, question, lambda part: self.tell(page, {"of": question.get("ask"), **part})
         )
+
+
+class _Server(ThreadingHTTPServer):
+    """With a queue for the questions of a page that come at once, of which the usual one of 5 resets some."""
+
+    request_queue_size = 128
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say nothing of a page that went away; the rest is said as the library says it."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
 
 
 class _Handler(BaseHTTPRequestHandler):

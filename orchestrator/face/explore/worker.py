@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from fmus.toolchain.temporary import remove_own
 from orchestrator.cases.flow.sharing import SharingRule
 from orchestrator.cases.form.schema import Value
 from orchestrator.cases.questions.idle_values import switches_of, why_idle
@@ -383,6 +384,7 @@ def serve() -> None:
         try:
             main()
         except (KeyboardInterrupt, BrokenPipeError):
+            remove_own()  # which the end below leaves out
             os._exit(1)
 
 

@@ -11,9 +11,12 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 import tomllib
+from contextlib import ExitStack, closing, nullcontext
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -25,10 +28,12 @@ from fmus.toolchain.python_fmu import PythonFmu
 from fmus.toolchain.temporary import own_folder, remove
 from orchestrator.face.cli import main
 from orchestrator.face.cli.explore import first_shown, way_to
-from orchestrator.face.explore import copies
+from orchestrator.face.explore import computing as computing_module
+from orchestrator.face.explore import copies, worker
 from orchestrator.face.explore.computing import Computing
+from orchestrator.face.explore.copies import Copy
 from orchestrator.face.explore.files import FILES, SCRIPTS, content_of
-from orchestrator.face.explore.server import Explorer
+from orchestrator.face.explore.server import LOOPBACK, Explorer
 from orchestrator.face.explore.worker import Desk
 from tests.studies.certification.sign_turned import turned
 
@@ -120,6 +125,58 @@ def test_no_other_file_is_given(explorer, name):
 
 def test_it_listens_on_loopback_alone(explorer):
     assert explorer._server.server_address[0] == "127.0.0.1"
+
+
+def test_forty_questions_at_once_are_all_heard():
+    """Nine of forty were reset."""
+    explorer = Explorer("two_area", BEGINNING)
+    place = (LOOPBACK, explorer.port)
+    with closing(explorer._server.socket), ExitStack() as lines:
+        for _ in range(40):  # nobody takes one yet
+            lines.enter_context(socket.create_connection(place, timeout=5.0))
+
+
+def test_a_process_of_whose_end_nobody_knows_has_no_exit_code():
+    line, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    computing = Computing("two_area")
+    computing._process = Copy(line, None, None)
+    other.send(b"-1")
+    other.close()
+    assert "ended by itself (how is not known)" in computing._lost("")
+
+
+def test_a_process_that_does_not_end_is_killed_and_waited_for(monkeypatch):
+    """Processes lived some seconds longer than the explorer, and left their folders."""
+    ends, swept = [], []
+
+    def wait(timeout=None):
+        if "kill" not in ends:
+            raise subprocess.TimeoutExpired("worker", timeout)
+
+    process = SimpleNamespace(
+        terminate=lambda: ends.append("terminate"), kill=lambda: ends.append("kill"), wait=wait
+    )
+    monkeypatch.setattr(computing_module, "sweep", swept.append)
+    computing = Computing("two_area")
+    computing._process = process
+    computing.close()
+    computing.wait_for_its_end()
+    assert ends == ["terminate", "kill"]
+    assert swept == [Path(tempfile.gettempdir())]
+
+
+def test_a_process_that_is_told_to_end_removes_its_folders(monkeypatch):
+    done = []
+
+    def interrupted():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(worker, "calls", SimpleNamespace(terminable=lambda ending: nullcontext()))
+    monkeypatch.setattr(worker, "main", interrupted)
+    monkeypatch.setattr(worker, "remove_own", lambda: done.append("removed"))
+    monkeypatch.setattr(os, "_exit", done.append)
+    worker.serve()
+    assert done == ["removed", 1]
 
 
 def test_a_port_that_is_taken_is_said(explorer):
