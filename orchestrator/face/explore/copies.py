@@ -37,7 +37,8 @@ class Copy:
         self._reading = threading.Lock()
         self._pid = 0
         self.returncode: int | None = None
-        weakref.finalize(self, line.close)  # not sooner: a thread may wait at it
+        # not sooner, for a thread may wait at it, and not at the end, where one may still
+        weakref.finalize(self, line.close).atexit = False
 
     @property
     def pid(self) -> int:
