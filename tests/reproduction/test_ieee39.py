@@ -10,8 +10,9 @@ from orchestrator.cases.case import load_case
 from orchestrator.studies.modes.modes import compute_modes
 from orchestrator.studies.runs.run import run_scenario
 from tests.support.late import LateLibrary
+from tests.support.pandapower_networks import pandapower_network
 
-pp, networks = LateLibrary("pandapower"), LateLibrary("pandapower.networks")
+pp = LateLibrary("pandapower")
 
 pytestmark = pytest.mark.reproduction
 
@@ -24,7 +25,7 @@ def prepare(scenario, overrides=None, **arguments):
 
 @pytest.mark.slow
 def test_the_voltages_are_pandapowers_but_for_the_stray_capacitances():
-    net = networks.case39()
+    net = pandapower_network("case39")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         pp.runpp(net, calculate_voltage_angles=True, numba=False)

@@ -17,8 +17,9 @@ from orchestrator.cases.networks import conversion as network_import
 from orchestrator.cases.networks.sources import _pandapower_tables
 from orchestrator.core.errors import InputError
 from tests.support.late import LateLibrary
+from tests.support.pandapower_networks import pandapower_network
 
-pandapower, networks = LateLibrary("pandapower"), LateLibrary("pandapower.networks")
+pandapower = LateLibrary("pandapower")
 pytestmark = pytest.mark.filterwarnings("ignore:tap_dependency_table:DeprecationWarning")
 SMALL = ["case9", "case14", "case39", "case57", "case118"]
 
@@ -26,7 +27,7 @@ SMALL = ["case9", "case14", "case39", "case57", "case118"]
 @cache
 def of_pandapower(name, **options):
     """A network solved by pandapower: its elements in our form, voltages by bus, and itself; nobody changes them."""
-    net = getattr(networks, name)()
+    net = pandapower_network(name)
     pandapower.runpp(
         net,
         calculate_voltage_angles=True,

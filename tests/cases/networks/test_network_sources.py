@@ -15,8 +15,9 @@ from orchestrator.cases.form.schema import NetworkTable
 from orchestrator.cases.networks.data import network_data
 from orchestrator.core.errors import InputError
 from tests.support.late import LateLibrary
+from tests.support.pandapower_networks import pandapower_network
 
-pp, networks = LateLibrary("pandapower"), LateLibrary("pandapower.networks")
+pp = LateLibrary("pandapower")
 
 SMALL = """\
 function mpc = small
@@ -83,7 +84,7 @@ def compare(flow, wanted):
 @pytest.mark.parametrize("name", ["case39", "case14", "case118", "case24_ieee_rts"])
 def test_a_pandapower_network_has_pandapowers_voltages(name, tmp_path):
     data = network_data(NetworkTable(pandapower=name), tmp_path)
-    net = getattr(networks, name)()
+    net = pandapower_network(name)
     assert data.frequency == net.f_hz
     flow = solved(data)
     assert flow.residual <= 1e-9

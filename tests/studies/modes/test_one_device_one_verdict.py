@@ -185,6 +185,7 @@ def test_a_device_that_does_not_fit_its_binding_is_not_called_stable(typed, monk
     assert "stable" in typed(*modes)[1].split("└")[0]
 
 
+@in_process
 @pytest.mark.slow
 def test_check_names_the_rating_beside_the_limit_that_is_exceeded(typed):
     found = checked(typed, "limits", v_n=22.0, i_max=1.5)["limits"]

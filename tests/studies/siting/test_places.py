@@ -113,7 +113,7 @@ def test_outages_are_ranked_and_what_a_bus_does_not_reach_is_said():
     assert found.agrees
 
 
-def test_a_foreign_fmu_is_linearised_and_confirmed(gfor, tmp_path):
+def test_a_foreign_fmu_is_linearised_and_confirmed(gfor, tmp_path, in_process):
     code, _, err = gfor("fmu", "build", "gfor", "--dest", str(tmp_path))
     assert code == 0, err
     request = SiteRequest(str(tmp_path / "gfor.fmu"), scenario="gfor", confirm=1)

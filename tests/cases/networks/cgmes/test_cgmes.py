@@ -20,9 +20,7 @@ from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import one_line
 from tests.cases.networks.psse.test_raw import pandapowers
 from tests.cases.networks.test_network_sources import solved
-from tests.support.late import LateLibrary
-
-networks = LateLibrary("pandapower.networks")
+from tests.support.pandapower_networks import pandapower_network
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +79,7 @@ def with_slack(data, slack):
 @pytest.mark.parametrize("name", ["case14", "case39"])
 def test_pandapowers_networks_as_cgmes_have_its_voltages(name, powsybl, tmp_path):
     """From pandapower to pypowsybl, to CGMES, to our network: voltages to 1e-6 pu."""
-    net = getattr(networks, name)()
+    net = pandapower_network(name)
     powsybl.network.convert_from_pandapower(net).save(str(tmp_path / "model.zip"), format="CGMES")
     data = network_data(NetworkTable(cgmes="model.zip"), tmp_path)
     wanted = pandapowers(net)

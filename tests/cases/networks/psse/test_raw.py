@@ -14,8 +14,9 @@ from orchestrator.core.errors import InputError
 from tests.cases.networks.psse import BUSES, LINES, LOADS, MACHINES, TRANSFORMERS, raw, records
 from tests.cases.networks.test_network_sources import solved
 from tests.support.late import LateLibrary
+from tests.support.pandapower_networks import pandapower_network
 
-pp, networks = LateLibrary("pandapower"), LateLibrary("pandapower.networks")
+pp = LateLibrary("pandapower")
 
 
 @pytest.fixture
@@ -87,7 +88,7 @@ def test_the_textbooks_voltages(written):
 
 def test_a_matpower_case_written_as_raw(written):
     """New England's 39 buses with off-nominal ratios, from pandapower's own tables."""
-    net = networks.case39()
+    net = pandapower_network("case39")
     pandapowers(net)
     found = {section: [] for section in records(33)}
     ppc = net._ppc["internal"] if "bus" not in net._ppc else net._ppc
