@@ -9,7 +9,12 @@ import numpy as np
 from orchestrator.core.arrays import Complex, Numbers, Vector
 from orchestrator.studies.immittance.judgement import encirclements
 from orchestrator.studies.immittance.loop import LoopPath, followed
-from orchestrator.studies.immittance.margins import crossings_of, gains_of, margins_of
+from orchestrator.studies.immittance.margins import (
+    crossings_of,
+    distance_of,
+    gain_up_of,
+    gains_of,
+)
 from orchestrator.studies.immittance.poles import fits
 
 _TURN = np.deg2rad(4.0)  # turn of det(1 + L) between two of the frequencies that are kept of a scan
@@ -46,16 +51,16 @@ class LoopFigures:
 def figures_of(path: LoopPath, growing: int | None, rated: float) -> LoopFigures:
     """Return the figures of a loop with so many growing modes; None where that is not known. The decaying direct
     current of network and stators, which in dq swings at the rated frequency, is no mode that is meant."""
-    crossings = crossings_of(path)
-    m = margins_of(path, crossings)
+    gains, distance = gains_of(path, crossings_of(path)), distance_of(path)
     sign = _sign(growing)
     modes = [p for p in light_modes(path) if abs(p.imag - rated) > _DIRECT * rated]
     modes = [p for p in modes if p.real < 0 or not sign > 0]  # the count knows better what grows
     mode = None if not modes or (sign < 0 and modes[0].real < 0) else modes[0]
-    beyond = [gain.value for gain in gains_of(path, crossings) if gain.value < 1]
-    up = m.gain_up.value if m.gain_up else math.inf
+    beyond = [gain.value for gain in gains if gain.value < 1]
+    gain_up = gain_up_of(gains)
+    up = gain_up.value if gain_up else math.inf
     weaker = up if sign > 0 else min(beyond, default=math.nan)
-    return LoopFigures(sign * m.distance.value, m.distance.frequency_hz, mode, weaker)
+    return LoopFigures(sign * distance.value, distance.frequency_hz, mode, weaker)
 
 
 def _sign(growing: int | None) -> float:
@@ -106,7 +111,7 @@ class Family:
     def distance(self, value: float) -> float:
         """From −1, as `LoopFigures` has it."""
         path, growing = self._path_and_growth(value)
-        return _sign(growing) * margins_of(path, []).distance.value
+        return _sign(growing) * distance_of(path).value
 
     def figures(self, value: float) -> LoopFigures:
         return figures_of(*self._path_and_growth(value), self.rated)

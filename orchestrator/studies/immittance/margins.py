@@ -92,9 +92,18 @@ def _is_free(a: complex, b: complex) -> bool:
     return abs(1 + a) <= _FREE or (abs(1 + a) < _NEAR and abs(1 + b) > 2 * abs(1 + a))
 
 
+def distance_of(path: LoopPath) -> Margin:
+    """The distance from −1 of `margins_of` alone."""
+    return _where_least(path, path.distance)
+
+
+def gain_up_of(gains: list[Margin]) -> Margin | None:
+    """The least factor above 1, of those that `gains_of` gives."""
+    return _least([m for m in gains if m.value > 1])
+
+
 def margins_of(path: LoopPath, crossings: list[Crossing]) -> NyquistMargins:
     gains = gains_of(path, crossings)
-    up = min((m for m in gains if m.value > 1), key=lambda m: m.value, default=None)
     down = max((m for m in gains if m.value <= 1), key=lambda m: m.value, default=None)
     turned, delayed = [], []
     for k in range(path.loci.shape[1]):
@@ -113,11 +122,11 @@ def margins_of(path: LoopPath, crossings: list[Crossing]) -> NyquistMargins:
         np.linalg.inv(one + path.L[counted]) - one / 2, ord=2, axis=(1, 2)
     )
     return NyquistMargins(
-        up,
+        gain_up_of(gains),
         down,
         _least(turned),
         _least(delayed),
-        _where_least(path, path.distance),
+        distance_of(path),
         _where_least(path, disk),
     )
 

@@ -127,10 +127,13 @@ def retune(
         for value in setting.grid[[GRID // 2, GRID // 4]].tolist():
             if len(out.scans) < _FIRST:
                 _scan(study, out, value, report)
+        family = _family(out)
         while len(out.scans) < _MOST and not _has_converged(out):
-            _check(study, out, report)
-        _tell(out)
-        _meet(study, out, goal, report)
+            family = _check(study, out, family, report)
+        try:
+            _meet(study, out, family, goal, report)
+        finally:
+            _tell(out)
     except CosimError as error:
         out.remark = f"cannot be followed: {error}"
     return out
@@ -184,9 +187,8 @@ def _has_converged(out: Retuned) -> bool:
     )
 
 
-def _check(study: Study, out: Retuned, report: Callable[[str], None]) -> None:
-    """Scan where all scans and all but one of them say most different things."""
-    family = _family(out)
+def _check(study: Study, out: Retuned, family: Family, report: Callable[[str], None]) -> Family:
+    """Scan where all scans and all but one of them say most different things; return the loops with that scan."""
     nodes = family.nodes[1:-1]
     fewer = [family.without(value) for value in nodes.tolist() if value != out.setting.now][-2:]
     apart = np.abs(
@@ -199,13 +201,19 @@ def _check(study: Study, out: Retuned, report: Callable[[str], None]) -> None:
     k = int(np.argmax(errors + 1e-6 * apart[np.searchsorted(out.setting.grid, open_)]))
     value = float(open_[k])
     _scan(study, out, value, report)
-    found = _family(out).distance(value)
+    family = _family(out)
+    found = family.distance(value)
     out.checks.append(Foretold(value, float(said[k]), float(errors[k]), found))
+    return family
+
+
+def _values(out: Retuned, family: Family) -> Numbers:
+    return np.unique(np.r_[out.setting.grid, family.nodes])
 
 
 def _tell(out: Retuned) -> None:
     family = _family(out)
-    out.values = np.unique(np.r_[out.setting.grid, family.nodes])
+    out.values = _values(out, family)
     out.figures = [family.figures(value) for value in out.values.tolist()]
     open_ = {
         f"{value:.4g}": r.judgement.reasons
@@ -217,24 +225,30 @@ def _tell(out: Retuned) -> None:
         out.remark = f"scans at {', '.join(open_)} give no verdict by themselves, and none of these is taken: {why}"
 
 
-def _meet(study: Study, out: Retuned, goal: float, report: Callable[[str], None]) -> None:
-    """Find the least change that meets the goal, and scan there."""
+def _meet(
+    study: Study, out: Retuned, family: Family, goal: float, report: Callable[[str], None]
+) -> None:
+    """Find the least change that meets the goal, and scan there.
+
+    ``family``: The loops of all scans until now."""
     for _ in range(_TRIES):
-        k, meets = int(np.searchsorted(out.values, out.setting.now)), out.distances >= goal
+        values = _values(out, family)
+        distances = np.array([family.distance(value) for value in values.tolist()])
+        k, meets = int(np.searchsorted(values, out.setting.now)), distances >= goal
         if meets[k] or not meets.any():
             return
         near = int(min(np.flatnonzero(meets), key=lambda i: abs(i - k)))
         back = near + (1 if near < k else -1)
-        d = out.distances[[back, near]]
+        d = distances[[back, near]]
         part = 1.0 if math.isnan(d[0]) else min(1.0, float((goal - d[0]) / (d[1] - d[0])) + _INSIDE)
-        value = float(out.values[back] + part * (out.values[near] - out.values[back]))
-        predicted = _family(out).figures(value)
+        value = float(values[back] + part * (values[near] - values[back]))
+        predicted = family.figures(value)
         result = _scan(study, out, value, report)
-        _tell(out)
-        found = out.figures[int(np.searchsorted(out.values, value))]
+        family = _family(out)
+        found = family.distance(value)
         out.checks.append(
-            Foretold(value, predicted.distance, abs(predicted.distance - goal), found.distance)
+            Foretold(value, predicted.distance, abs(predicted.distance - goal), found)
         )
-        if found.distance >= goal and result.verdict is NyquistVerdict.STABLE:
+        if found >= goal and result.verdict is NyquistVerdict.STABLE:
             out.needed, out.predicted = value, predicted
             return
