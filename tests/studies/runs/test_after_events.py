@@ -37,6 +37,14 @@ def case(tmp_path):
     return tmp_path / "five.toml"
 
 
+@pytest.fixture(scope="module")
+def before(tmp_path_factory):
+    """The modes of the case as it is."""
+    folder = tmp_path_factory.mktemp("before")
+    five_machines(folder)
+    return gfor_api.load(folder / "five.toml").scenario("base").modes().result
+
+
 def run(gfor, case, *further, stop="3"):
     code, out, err = gfor(
         "run",
@@ -100,9 +108,8 @@ DAMPINGS = [
 
 @pytest.mark.parametrize(("damping", "fast", "stop", "good"), DAMPINGS)
 def test_a_whole_run_decides_about_modes_near_zero_and_not_of_others_that_grow(
-    case, monkeypatch, damping, fast, stop, good
+    before, monkeypatch, damping, fast, stop, good
 ):
-    before = gfor_api.load(case).scenario("base").modes().result
     least, other = (
         replace(before.modes[0], eigenvalue=value)
         for value in (complex(-damping / 20, 5), fast + 300j)
@@ -126,9 +133,8 @@ def test_a_whole_run_decides_about_modes_near_zero_and_not_of_others_that_grow(
     assert ("by a power flow, decides nothing" in found.remark) is (good and damping < 0.5)
 
 
-def of_two_modes(case, monkeypatch, moved, other):
+def of_two_modes(before, monkeypatch, moved, other):
     """The table and the JSON of a run whose least damped mode goes to ``moved`` and whose next one to ``other``."""
-    before = gfor_api.load(case).scenario("base").modes().result
     least, next_one = sorted(before.modes, key=lambda mode: mode.damping_percent)[:2]
     left = [replace(least, eigenvalue=moved), replace(next_one, eigenvalue=other)]
     after = replace(before, modes=left, stability=replace(before.stability, stable=True, mode=None))
@@ -140,9 +146,9 @@ def of_two_modes(case, monkeypatch, moved, other):
     return found, console.export_text(), least, after
 
 
-def test_an_arrow_leads_from_a_mode_to_itself(case, monkeypatch):
+def test_an_arrow_leads_from_a_mode_to_itself(before, monkeypatch):
     """The least damped mode before the events is well damped after them, and another one is the least damped."""
-    found, table, least, after = of_two_modes(case, monkeypatch, -2.0 + 8.0j, -0.3 + 6.0j)
+    found, table, least, after = of_two_modes(before, monkeypatch, -2.0 + 8.0j, -0.3 + 6.0j)
     assert (found.became, found.after) == tuple(after.modes)
     assert f"{least.frequency_hz:.3f} → {8 / 2 / np.pi:.3f}" in table
     assert f"{6 / 2 / np.pi:.3f}" in table
@@ -152,16 +158,16 @@ def test_an_arrow_leads_from_a_mode_to_itself(case, monkeypatch):
     assert told["same_mode"]["frequency_hz"] == pytest.approx(8 / 2 / np.pi)
 
 
-def test_the_same_mode_after_the_events_is_one_row(case, monkeypatch):
-    found, table, least, _ = of_two_modes(case, monkeypatch, -0.3 + 6.0j, -2.0 + 8.0j)
+def test_the_same_mode_after_the_events_is_one_row(before, monkeypatch):
+    found, table, least, _ = of_two_modes(before, monkeypatch, -0.3 + 6.0j, -2.0 + 8.0j)
     assert found.became is found.after
     assert f"{least.frequency_hz:.3f} → {6 / 2 / np.pi:.3f}" in table
     assert "least damped after" not in table
 
 
-def test_no_arrow_leads_to_a_mode_that_is_not_clearly_the_same(case, monkeypatch):
+def test_no_arrow_leads_to_a_mode_that_is_not_clearly_the_same(before, monkeypatch):
     monkeypatch.setattr(answer_of_run, "same_mode", lambda *_: None)
-    found, table, least, _ = of_two_modes(case, monkeypatch, -0.3 + 6.0j, -2.0 + 8.0j)
+    found, table, least, _ = of_two_modes(before, monkeypatch, -0.3 + 6.0j, -2.0 + 8.0j)
     assert "→" not in table
     assert f"{least.frequency_hz:.3f}" in table
     assert f"{6 / 2 / np.pi:.3f}" in table
