@@ -4,7 +4,7 @@ Each step takes the eigenvalues of all operating points with their sensitivities
 program for the change that raises the least damping ratio most, without other modes falling below their floors. The
 change counts only if the eigenvalues that it really gives are better."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -14,7 +14,7 @@ from orchestrator.core.arrays import Numbers
 from orchestrator.core.bisection import halve_towards
 from orchestrator.core.late import optimize
 from orchestrator.studies.coordinated_design.objective import RatedPoint, Watched, Worth, together
-from orchestrator.studies.coordinated_design.open_loops import PodPlace
+from orchestrator.studies.coordinated_design.open_loops import PodPlace, Setting
 from orchestrator.studies.coordinated_design.settings import PodGroup, SettingSpace
 from orchestrator.studies.pod_design.closed_loop import PodSetting
 from orchestrator.studies.pod_design.lead_lag import angle_deg, compensation_deg
@@ -51,6 +51,10 @@ _SPREAD = 64  # vectors that are spread over all ranges for each of several grou
 _MOST_SPREAD = 256  # such vectors at most
 
 
+IsBetter = Callable[["Tried", "Tried"], bool]
+"""Whether a vector is better than another one."""
+
+
 @dataclass(frozen=True)
 class Tried:
     """A vector, its worth, and the number of linear programs that led there."""
@@ -75,10 +79,28 @@ class SettingSearch:
         self.evaluations = 0
 
     def tried(self, x: Numbers, steps: int = 0) -> Tried:
+        setting = self._counted(x)
+        return Tried(x, together(point.worth(setting) for point in self._points), steps)
+
+    def _counted(self, x: Numbers) -> Setting:
         self.evaluations += 1
         tell_doing(f"{self._name}, {self.evaluations} settings tried")
-        setting = self._space.setting(x)
-        return Tried(x, together(point.worth(setting) for point in self._points), steps)
+        return self._space.setting(x)
+
+    def _above(self, x: Numbers, other: Tried, is_better: IsBetter, steps: int = 0) -> Tried | None:
+        """A vector as `tried` has it, if it is better than another one.
+
+        A further point makes no vector better, so that the first ones may decide. The point that limits the other
+        vector is asked first."""
+        setting, worths = self._counted(x), dict[int, Worth]()
+        places = range(len(self._points))
+        one = None
+        for k in sorted(places, key=lambda k: self._points[k].number != other.worth.point):
+            worths[k] = self._points[k].worth(setting)
+            one = Tried(x, together(worths[k] for k in places if k in worths), steps)
+            if not is_better(one, other):
+                return None
+        return one
 
     def best(self, starts: int | None = None, *, polish: bool = True) -> Tried:
         """The best vector that the search finds; it harms no other mode, unless every vector does.
@@ -116,9 +138,10 @@ class SettingSearch:
             np.unique(np.linspace(low[k], high[k], number)) for k, number in enumerate(_GRID[:2])
         ]
         gains = np.unique(np.geomspace(max(low[2], _LEAST_SHARE * high[2]), high[2], _GRID[2]))
-        grid = [self.tried(np.array(x)) for x in product(*ends, gains)]
-        best = max(grid, key=lambda one: (one.worth.allowed, one.merit))
-        if (best.worth.allowed, best.merit) > (found.worth.allowed, found.merit):
+        grid, best = [np.array(x) for x in product(*ends, gains)], found
+        for x in grid:
+            best = self._above(x, best, _does_less_harm_or_damps_more) or best
+        if best is not found:
             found = self.improved(self._polished(best))
         return found, len(grid)
 
@@ -185,9 +208,11 @@ class SettingSearch:
             steps += 1
             change = program.change(radius)
             there = (
-                None if change is None else self.tried(self._space.clipped(here.x + change), steps)
+                None
+                if change is None
+                else self._above(self._space.clipped(here.x + change), here, _has_more_merit, steps)
             )
-            if there is not None and there.merit > here.merit + _WORTH:
+            if there is not None:
                 here, radius = there, min(1.5 * radius, _LARGEST)
                 program = self._program(here.x)
             else:
@@ -259,6 +284,14 @@ class SettingSearch:
 
         halve_towards(1.0, 0.0, holds, most=_HALVINGS_OF_GAINS)
         return best
+
+
+def _has_more_merit(one: Tried, other: Tried) -> bool:
+    return one.merit > other.merit + _WORTH
+
+
+def _does_less_harm_or_damps_more(one: Tried, other: Tried) -> bool:
+    return (one.worth.allowed, one.merit) > (other.worth.allowed, other.merit)
 
 
 def _is_near(mode: Watched, worst: float, rest: float) -> bool:
