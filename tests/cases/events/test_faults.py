@@ -337,6 +337,9 @@ def test_a_sweep_varies_a_delay_in_whole_steps(tmp_path, capsys):
 # -- many ------------------------------------------------------------------------------------------
 
 
+MANY = 10_000
+
+
 def test_many_events_are_read_without_looking_through_all_of_them_for_each(tmp_path):
     """With a search through the file, or through all problems, for each of them this takes many minutes."""
     events = "".join(
@@ -346,9 +349,9 @@ def test_many_events_are_read_without_looking_through_all_of_them_for_each(tmp_p
             f"{(k + 1) * 1e-4:.4f}",
             "",
         )
-        for k in range(20_000)
+        for k in range(MANY)
     )
-    assert len(prepare(case_with(tmp_path, "", events), stop_time=3.0).events) == 20_000
+    assert len(prepare(case_with(tmp_path, "", events), stop_time=3.0).events) == MANY
     off = events.replace('00"', '005 s"').replace('5"', '55 s"')
     said = problems(case_with(tmp_path, "", off), stop_time=3.0)
     assert len(said.splitlines()) == 202

@@ -719,9 +719,9 @@ def test_a_dask_cluster_screens_what_one_process_does(two_area, day, tmp_path, m
     monkeypatch.setattr(study, "STRETCH", 2)
     plan = plan_screening(two_area[0], ScreeningRequest(day, None, "gfor"))
     alone = screened(plan, tmp_path / "alone")
-    # a worker in a thread; `tests/studies/sweep/test_sweep.py` has two in processes
+    # a worker in a thread, which is sent everything; `tests/studies/sweep/test_sweep.py` has one in a process
     with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address=None
     ) as cluster:
         together = run_screening(
             plan, Work(DaskCluster(cluster.scheduler_address), PointStore(tmp_path / "together"))

@@ -492,8 +492,8 @@ def test_a_dask_cluster_computes_what_one_process_does(tmp_path):
     distributed = pytest.importorskip("distributed")
     vary, scenarios = "grid.X_L=0.1,0.2", ["base", "pod_pq"]
     alone = sweep("two_area", tmp_path / "alone", vary, scenarios=scenarios)
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=None
+    with distributed.LocalCluster(  # of one: `tests/studies/points/test_executors.py` has two
+        n_workers=1, threads_per_worker=1, dashboard_address=None
     ) as cluster:
         executor = DaskCluster(cluster.scheduler_address)
         together = sweep(
