@@ -79,10 +79,10 @@ class SettingSearch:
         self.evaluations = 0
 
     def tried(self, x: Numbers, steps: int = 0) -> Tried:
-        setting = self._counted(x)
+        setting = self._begin(x)
         return Tried(x, together(point.worth(setting) for point in self._points), steps)
 
-    def _counted(self, x: Numbers) -> Setting:
+    def _begin(self, x: Numbers) -> Setting:
         self.evaluations += 1
         tell_doing(f"{self._name}, {self.evaluations} settings tried")
         return self._space.setting(x)
@@ -92,7 +92,7 @@ class SettingSearch:
 
         A further point makes no vector better, so that the first ones may decide. The point that limits the other
         vector is asked first."""
-        setting, worths = self._counted(x), dict[int, Worth]()
+        setting, worths = self._begin(x), dict[int, Worth]()
         places = range(len(self._points))
         one = None
         for k in sorted(places, key=lambda k: self._points[k].number != other.worth.point):
