@@ -11,6 +11,7 @@ import xarray as xr
 
 from orchestrator.core.errors import InputError
 from orchestrator.face.api.case import load
+from orchestrator.face.cli import main
 from orchestrator.face.cli import run as command
 from orchestrator.output.results.lock import LOCK, hold_folder
 from orchestrator.systems.coupling.observers import Progress
@@ -131,6 +132,19 @@ def test_rows_that_are_not_the_runs_are_not_published(gfor, monkeypatch, tmp_pat
     assert "follow each other there without a gap" in error
 
 
+@pytest.fixture(scope="module")
+def nothing_recorded(undrawn, tmp_path_factory):
+    """Results whose recording has no row; they are read only."""
+    folder = tmp_path_factory.mktemp("empty")
+    assert main([*SHORT, "--out", str(folder)]) == 0
+    file = folder / "dip" / "trajectory.nc"
+    whole = xr.load_dataset(file)
+    whole.isel(time=slice(0, 0)).to_netcdf(file)
+    for manifest in folder.rglob("manifest.json"):
+        manifest.unlink()
+    return folder
+
+
 @pytest.mark.parametrize(
     "words",
     [
@@ -139,14 +153,8 @@ def test_rows_that_are_not_the_runs_are_not_published(gfor, monkeypatch, tmp_pat
         ("signal", "compare", "{0}/dip", "{0}/dip"),
     ],
 )
-def test_an_empty_recording_is_one_error(gfor, tmp_path, words):
-    assert gfor(*SHORT, "--out", tmp_path)[0] == 0
-    file = tmp_path / "dip" / "trajectory.nc"
-    whole = xr.load_dataset(file)
-    whole.isel(time=slice(0, 0)).to_netcdf(file)
-    for manifest in tmp_path.rglob("manifest.json"):
-        manifest.unlink()
-    code, _, error = gfor(*(word.format(tmp_path) for word in words))
+def test_an_empty_recording_is_one_error(gfor, nothing_recorded, words):
+    code, _, error = gfor(*(word.format(nothing_recorded) for word in words))
     assert code == 2
     assert "nothing was recorded in it" in error
 
