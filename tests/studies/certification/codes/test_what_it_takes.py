@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import pytest
 
-import orchestrator as gfor_api
 from orchestrator.core.errors import InputError
 from orchestrator.studies.certification.codes import what_it_takes as w
 from orchestrator.studies.certification.codes.all_codes import CODES
@@ -22,9 +21,9 @@ from orchestrator.studies.certification.request import CertificationRequest
 from orchestrator.studies.points.executor import Serial
 
 
-@pytest.fixture(scope="module")
-def converter(tmp_path_factory):
-    return gfor_api.build("gfor", tmp_path_factory.mktemp("fmu"))
+@pytest.fixture
+def converter(fmu_path):
+    return fmu_path("gfor", native=True)
 
 
 def certified(converter, folder, values, code=ERCOT, row="inertia_down"):
