@@ -111,7 +111,7 @@ def linear_model(case):
 
 
 @pytest.fixture
-def case(tmp_path):
+def case(tmp_path, in_process):
     def write(**options):
         fmu = 'model = "gfor"'
         if options:

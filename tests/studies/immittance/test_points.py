@@ -80,7 +80,7 @@ def test_a_verdict_by_point_of_scans_and_what_cannot_be_judged(tmp_path, capsys)
         assert "a scan has no P_0 to be set" in next(csv.DictReader(file))["remark"]
 
 
-def test_an_fmu_is_scanned_at_each_point(tmp_path, capsys):
+def test_an_fmu_is_scanned_at_each_point(tmp_path, capsys, in_process):
     fmu = gfor.build("gfor", tmp_path, native=True)
     points = written(tmp_path / "p.csv", "name,P_0,what", "low,0.2,", "high,0.8,", "odd,0.5,1")
     command = [

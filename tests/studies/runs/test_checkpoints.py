@@ -140,13 +140,18 @@ def disturbed(folder, values=None):
     return prepare_one(folder / "case.toml", "dip", values, None, STOP)
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """What a run with delay lines and noise tells that nothing interrupts."""
+    return told(run_scenario(disturbed(tmp_path_factory.mktemp("whole"))))
+
+
 @pytest.mark.parametrize("at", [0.5, 1.1, 1.26])
-def test_delay_lines_and_noise_go_on_to_the_last_bit(tmp_path, said, at):
+def test_delay_lines_and_noise_go_on_to_the_last_bit(tmp_path, said, whole, at):
     prepared = disturbed(tmp_path)
     assert len(prepared.system.wires) == 2
-    whole = run_scenario(prepared)
     interrupted(prepared, tmp_path / "kept", said, at)
-    assert told(resumed(prepared, tmp_path / "kept", said)) == told(whole)
+    assert told(resumed(prepared, tmp_path / "kept", said)) == whole
 
 
 def test_another_delay_is_named(tmp_path, said):
