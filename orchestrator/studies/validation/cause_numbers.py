@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from orchestrator.core.arrays import Numbers
 from orchestrator.devices.fmi.description import VariableInfo
@@ -90,13 +91,14 @@ def follow(
     return best
 
 
-Way = Generator[Values, Responses | None, tuple[float, Numbers]]
-"""A number on its way to the value that leaves the least: it asks for responses, and ends with the value and errors."""
+End = TypeVar("End")
+Way = Generator[Values, Responses | None, End]
+"""Values of a number, one after the other: each asks for the responses with it, and the last one tells the end."""
 
 
-def _ends_of(bench: CauseBench, ways: Sequence[Way]) -> list[tuple[float, Numbers]]:
+def _ends_of(bench: CauseBench, ways: Sequence[Way[End]]) -> list[End]:
     """Where some ways end, which go on side by side: what all of them ask for next may be made at once."""
-    ends: dict[int, tuple[float, Numbers]] = {}
+    ends: dict[int, End] = {}
     asked: dict[int, Values] = {}
 
     def go_on(number: int, found: Responses | None) -> None:
@@ -128,7 +130,7 @@ class _Place:
 
 def _way_to_best(
     bench: CauseBench, number: Adjustable, begin: _Place, others: Sequence[str] = ()
-) -> Way:
+) -> Way[tuple[float, Numbers]]:
     """The best value of a number, by Gauss and Newton with secants for slopes."""
     at, error, slope = begin.value, begin.error, begin.slope
     size = squares_of(slope)
@@ -160,15 +162,14 @@ def numbers_by_factors(
     One that moves nothing where it is may be a limit that is not reached: it is tried lower."""
     moving = [(one.number, _FACTORS) for one in promises]
     idle = [(adjustable(bench.device, info, None), _FACTORS[:1]) for info in rough.idle]
-    rough.announce(
-        {number.name: factor * number.start}
-        for number, factors in [*moving, *idle]
-        for factor in factors
-        if _may_be(number, factor * number.start)
-    )
+    tried = [*moving, *idle]
+    ways = [
+        _along_factors(rough, number, factor) for number, factors in tried for factor in factors
+    ]
+    ends = iter(_ends_of(rough, ways))
     found: list[tuple[float, Adjustable, _Place]] = []
-    for number, factors in [*moving, *idle]:
-        places = [place for factor in factors for place in _along_factors(rough, number, factor)]
+    for number, factors in tried:
+        places = [place for _ in factors for place in next(ends)]
         if places:
             best = min(places, key=lambda one: squares_of(one.error))
             found.append((squares_of(best.error), number, best))
@@ -182,20 +183,22 @@ def _may_be(number: Adjustable, value: float) -> bool:
     return number.start > 0 and number.low <= value <= number.high
 
 
-def _along_factors(rough: CauseBench, number: Adjustable, factor: float) -> Iterator[_Place]:
+def _along_factors(rough: CauseBench, number: Adjustable, factor: float) -> Way[list[_Place]]:
     """A number at a factor, at its square and so on, as long as each leaves less than the one before."""
+    places: list[_Place] = []
     at, error = number.start, rough.error
     for _ in range(_MOST_FACTORS):
         value = factor * at
         if not _may_be(number, value):
-            return
+            break
         rough.report(f"trying {number.name} = {value:.4g}")
-        found = rough.responses({number.name: value})
+        found = yield {number.name: value}
         here = None if found is None else rough.errors(found)
         if here is None or squares_of(here) >= squares_of(error):
-            return
-        yield _Place(value, here, (here - error) / (value - at))
+            break
+        places.append(_Place(value, here, (here - error) / (value - at)))
         at, error = value, here
+    return places
 
 
 def _followed(
