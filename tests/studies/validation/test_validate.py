@@ -14,11 +14,19 @@ from orchestrator.studies.validation.limits import EXAMPLE
 from tests.studies.validation.recordings import run, table, waves, with_noise, written
 
 ON = {"pod_p.enabled": True}
+STEP = "500 us"
+"""Of the device where it is not the subject: as long as a first look has, so that none is made beside it."""
 
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
-    return written(with_noise(table(run())), tmp_path_factory.mktemp("recording"))
+    return written(with_noise(table(run(stop=3.0))), tmp_path_factory.mktemp("recording"))
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """One that is long enough for the example's limits of a ring-down."""
+    return written(with_noise(table(run())), tmp_path_factory.mktemp("whole"))
 
 
 @pytest.fixture(scope="module")
@@ -99,11 +107,13 @@ def in_comtrade(frame, path):
 
 
 def test_an_excel_file_gives_the_same_figures(recording, tmp_path):
-    frame = pd.read_csv(recording)
+    frame = pd.read_csv(recording)[::10]
     frame.to_excel(tmp_path / "rec.xlsx", index=False)
+    frame.to_csv(tmp_path / "rec.csv", index=False)
+    given = {"values": ON, "step": STEP}
     tables = [
-        gfor_in_python.validate("gfor", path, values=ON).table().drop(columns="recording")
-        for path in (recording, tmp_path / "rec.xlsx")
+        gfor_in_python.validate("gfor", tmp_path / name, **given).table().drop(columns="recording")
+        for name in ("rec.csv", "rec.xlsx")
     ]
     pd.testing.assert_frame_equal(*tables)
 
@@ -121,16 +131,17 @@ def test_a_fault_recorders_waves_in_comtrade_agree_with_the_device(gfor, recordi
 
 def test_several_events_stand_in_one_table(recording, tmp_path):
     other = written(with_noise(table(run(stop=3.0, scale=0.95)), 2), tmp_path, "other.csv")
-    found = gfor_in_python.validate("gfor", [recording, other], values=ON).table()
+    given = {"values": ON, "step": STEP}
+    found = gfor_in_python.validate("gfor", [recording, other], **given).table()
     after = found.query("window == 'after' and signal == 'p'").set_index("recording")
     assert list(after.index) == [str(recording), str(other)]
     assert after["mean_abs_error_pu"].max() < 0.002
 
 
-def test_the_folder_holds_figures_curves_and_the_page(gfor, recording, tmp_path):
+def test_the_folder_holds_figures_curves_and_the_page(gfor, whole, tmp_path):
     out = tmp_path / "out"
     options = ("--set", "pod_p.enabled=true", "--limits", str(EXAMPLE), "--out", str(out))
-    code, _, _ = gfor("validate", "gfor", str(recording), *options)
+    code, _, _ = gfor("validate", "gfor", str(whole), *options)
     assert code == 0
     assert json.loads((out / "validation.json").read_text())["verdict"] == "met"
     assert len(pd.read_csv(out / "curves_1.csv")) == 6001
@@ -143,8 +154,10 @@ def test_the_folder_holds_figures_curves_and_the_page(gfor, recording, tmp_path)
 
 
 def test_the_device_itself_agrees_and_another_setting_does_not(recording):
-    right = gfor_in_python.validate("gfor", recording, values=ON)
-    wrong = gfor_in_python.validate("gfor", recording, values={**ON, "droop.R_f": 0.02})
+    right, wrong = (
+        gfor_in_python.validate("gfor", recording, values=ON | values, step=STEP)
+        for values in ({}, {"droop.R_f": 0.02})
+    )
     error = [
         found.table().query("window == 'after' and signal == 'p'")["mean_abs_error_pu"].item()
         for found in (right, wrong)
@@ -160,9 +173,9 @@ def test_a_run_of_the_same_model_is_too_good():
     assert found.table().query("window == 'before'")["max_error_pu"].max() < 2e-5
 
 
-def test_a_component_of_a_case_is_validated(gfor, recording):
+def test_a_component_of_a_case_is_validated(gfor, whole):
     options = ("--component", "gfor", "--scenario", "pod_p", "--limits", str(EXAMPLE))
-    code, out, _ = gfor("validate", "two_area", str(recording), *options)
+    code, out, _ = gfor("validate", "two_area", str(whole), *options)
     assert code == 0
     assert "MET" in out
 
@@ -170,7 +183,7 @@ def test_a_component_of_a_case_is_validated(gfor, recording):
 def test_limits_that_are_not_met_are_named_and_end_with_3(gfor, recording, tmp_path):
     limits = tmp_path / "limits.toml"
     limits.write_text('source = "mine"\n[windows.after.p]\nmean_abs_error = 0.005\n')
-    options = ("--set", "droop.R_f=0.02", "--limits", str(limits), "--json")
+    options = ("--set", "droop.R_f=0.02", "--limits", str(limits), "--step", STEP, "--json")
     code, out, _ = gfor("validate", "gfor", str(recording), *options)
     assert code == 3
     content = json.loads(out)
@@ -209,8 +222,9 @@ def test_windows_are_as_the_user_says(recording):
 
 def test_the_sample_in_which_the_event_begins_is_the_events():
     """A right model, and a recorder of 50 samples a second whose sample at 1 s holds a part of the event."""
-    frame = with_noise(table(run())).iloc[::20].set_index("time")
-    found = gfor_in_python.validate("gfor", frame, values=ON, events=[(1.0, 1.1)]).table()
+    frame = with_noise(table(run(stop=3.0))).iloc[::20].set_index("time")
+    given = {"values": ON, "step": STEP, "events": [(1.0, 1.1)]}
+    found = gfor_in_python.validate("gfor", frame, **given).table()
     largest = found.groupby("window")["max_error_pu"].max()
     assert largest["before"] < 0.01
     assert largest["during"] > 0.05
