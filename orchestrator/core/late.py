@@ -5,7 +5,8 @@ A module that may do without them imports them from here, and defers its annotat
 annotations``), which would use the library at once."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from importlib import import_module
 from importlib.machinery import ModuleSpec, PathFinder
 from importlib.util import LazyLoader
@@ -67,10 +68,31 @@ def import_xarray_alone() -> None:
     has xarray already keeps it as it is."""
     if "xarray" in sys.modules:
         return
+    with _hidden():
+        xr.Dataset({"numbers": ("time", [0.0])}, coords={"time": [0.0]}).isel(time=0).load()
+    _Xarray.alone = True
+
+
+@contextmanager
+def xarray_alone() -> Iterator[None]:
+    """Keep xarray from importing dask to write a file, in a process that has `import_xarray_alone` behind it.
+
+    It would ask dask who else writes, for which it imports distributed too: half a second."""
+    with _hidden() if _Xarray.alone else nullcontext():
+        yield
+
+
+class _Xarray:
+    alone = False  # whether it was imported as if dask were not installed
+
+
+@contextmanager
+def _hidden() -> Iterator[None]:
+    """Let dask and pint not be found, unless somebody has imported them already."""
     hidden = [name for name in ("dask", "pint") if name not in sys.modules]
     sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type] # None: is not to be found
     try:
-        xr.Dataset({"numbers": ("time", [0.0])}, coords={"time": [0.0]}).isel(time=0).load()
+        yield
     finally:
         for name in hidden:
             del sys.modules[name]
@@ -84,5 +106,6 @@ __all__ = [
     "put_off_parts_of_numpy",
     "signal",
     "stats",
+    "xarray_alone",
     "xr",
 ]

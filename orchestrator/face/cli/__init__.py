@@ -56,10 +56,11 @@ _READERS = (
     "signal compare",
     "signal identify",
     "signal source",
+    "sweep",
     "validate",
     "verify",
 )
-"""Commands that read or write recordings, with xarray, and hand no array of theirs to dask or pint."""
+"""Commands that read or write recordings and tables, with xarray, and hand no array of theirs to dask or pint."""
 
 # the page that ``gfor`` alone prints
 QUESTIONS = Path(__file__).with_name("questions.txt").read_text(encoding="utf-8")

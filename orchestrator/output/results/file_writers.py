@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fmus.toolchain.extras import installed_version
 from orchestrator.core.arrays import Matrix
-from orchestrator.core.late import xr
+from orchestrator.core.late import xarray_alone, xr
 from orchestrator.core.safe_files import replacing, write_bytes, write_text
 from orchestrator.output.results.netcdf import netcdf_image, stored_name
 from orchestrator.systems.coupling.filtered_recorder import FILTER
@@ -205,4 +205,6 @@ def save_matrices(content: Mapping[str, Any], path: Path) -> None:
 def save_netcdf(dataset: xr.Dataset, path: Path) -> None:
     """Write a dataset of moderate size as NetCDF-3."""
     kept = dataset.rename({name: stored_name(str(name)) for name in dataset.data_vars})
-    write_bytes(path, bytes(kept.to_netcdf(engine="scipy")))
+    with xarray_alone():
+        image = kept.to_netcdf(engine="scipy")
+    write_bytes(path, bytes(image))
