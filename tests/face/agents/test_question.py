@@ -131,7 +131,7 @@ converter = "gfor_phasor"
 
 def test_a_cache_elsewhere_serves_as_well(tmp_path, monkeypatch):
     monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path / "cache"))
-    (weakest, *_) = Verbs(allowance(tmp_path)).scr("two_area").buses
+    (weakest, *_) = Verbs(allowance(tmp_path)).scr("wscc9").buses  # of few FMUs
     assert weakest.s_sc_mva > 0
 
 
