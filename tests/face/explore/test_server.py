@@ -369,6 +369,20 @@ def test_a_dead_process_ends_its_question_and_not_the_next(computing):
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere no process is copied")
+def test_what_later_questions_need_is_imported_once_while_nobody_asks(computing):
+    """By the process that is copied, after the first question: each copy imported pandas and parts of SciPy anew."""
+    assert "answer" in answer(computing)
+    loaded = Path(f"/proc/{copies._original._process.pid}/maps")
+    wait_until(
+        lambda: (
+            {"pandas", "scipy/optimize"}
+            <= {*re.findall(r"site-packages/(pandas|scipy/optimize)/", loaded.read_text())}
+        )
+    )
+
+
+@pytest.mark.slow
 def test_the_process_that_was_copied_is_begun_anew_where_it_died(computing):
     assert "answer" in answer(computing)
     before = copies._original._process
