@@ -108,6 +108,7 @@ def runs(block):
     return block.language == "python" and not block.kind and block.page.suffix == ".md"
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("page", [p for p in PAGES if any(map(runs, blocks(p)))], ids=name_of)
 def test_python_blocks_run(page, tmp_path, monkeypatch, fmu_path):
     """In order, in one namespace, in a folder with the FMUs that the leaflets are about."""

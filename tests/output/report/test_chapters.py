@@ -301,6 +301,7 @@ def test_provenance_names_command_code_and_date(gfor, tmp_path):
     assert "nothing was run" in text
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_runs_row_says_what_was_given_and_which_models_were_run(gfor, tmp_path):
     given = (
         "--set",
