@@ -455,14 +455,6 @@ def test_an_fmu_that_was_closed_says_so(fmu_path):
         pass
 
 
-def test_an_fmu_is_checked(fmu_path):
-    report = face.check(fmu_path("infinite_bus"), only=["runs"])
-    assert report.trusted
-    assert not report.faults
-    assert report.as_json()["trusted"]
-    assert "no check failed" in report._repr_html_()
-
-
 def test_an_fmu_is_checked_as_a_case_uses_it(fmu_path, gfor, tmp_path):
     fmu, options = (
         fmu_path("infinite_bus"),
@@ -471,6 +463,10 @@ def test_an_fmu_is_checked_as_a_case_uses_it(fmu_path, gfor, tmp_path):
     report = face.check(
         fmu, only=["runs"], time_limit="20 s", memory_limit=2000, step="200 us", **options
     )
+    assert report.trusted
+    assert not report.faults
+    assert report.as_json()["trusted"]
+    assert "no check failed" in report._repr_html_()
     assert "component 'grid' in scenario 'load_step'" in report.as_json()["used_as"]
     assert "steps of 0.0002 s" in report.table().loc["runs", "evidence"]
     words = [word for name, value in options.items() for word in (f"--{name}", value)]
