@@ -29,11 +29,13 @@ class ModeAnswer(BaseModel):
     real: Figure = Field(description="Re λ [1/s]")
     imag: Figure = Field(description="Im λ [rad/s]")
     participation: Part = Field(
-        description="state: magnitude of its participation factor; the five largest, the largest first"
+        description="state: magnitude of its participation factor; the largest first, five unless `parts` says more"
     )
     shape: dict[str, tuple[Figure, Figure]] = Field(
-        description="machine: magnitude and angle [deg] of its speed in the right eigenvector, the largest at 1 and 0"
+        description="machine: magnitude and angle [deg] of its speed in the right eigenvector, the largest at 1 and 0; "
+        "five unless `parts` says more"
     )
+    machines_left_out: int = Field(description="machines that move less in it and are not listed")
 
 
 class ScenarioModesAnswer(BaseModel):
@@ -47,9 +49,12 @@ class ScenarioModesAnswer(BaseModel):
         description="the frequencies of the modes that are listed [Hz]; the verdict is of all"
     )
     modes: list[ModeAnswer] = Field(
-        description="oscillatory modes in that range, the least damped first"
+        description="oscillatory modes in that range that have a name or are damped least, the least damped first"
     )
-    left_out: int = Field(description="modes in that range that are not listed, all better damped")
+    left_out: int = Field(
+        description="modes in that range that are not listed, "
+        "all better damped than those without a name; `most` lists more"
+    )
     outside_range: int | None = Field(
         description="oscillatory modes outside of that range, which `frequencies_hz` asks for; null if they are not "
         "all known"

@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,13 @@ _turns = threading.BoundedSemaphore(2)
 
 _writing = threading.BoundedSemaphore(1)
 """Questions that write take turns: they write into one folder."""
+
+
+_LOOK = 0.2
+"""Longest between two looks at whether a question was cancelled [s]."""
+
+cancelled: ContextVar[threading.Event | None] = ContextVar("cancelled", default=None)
+"""Set by who asks, where it may cancel its question: the command then ends, and its turn is another's."""
 
 
 class NoAnswerError(InputError):
@@ -94,10 +102,20 @@ def ask(words: Sequence[str], allowance: Allowance) -> Any:
         return _ask(words, allowance)
 
 
+def _check_is_wanted() -> None:
+    """Raise where the question was cancelled."""
+    event = cancelled.get()
+    if event is not None and event.is_set():
+        raise NoAnswerError("it was cancelled")
+
+
 @contextmanager
 def _turn(one: threading.BoundedSemaphore, until: float, allowance: Allowance) -> Iterator[None]:
     """Wait for a turn until a time; it ends with the block."""
-    if not one.acquire(timeout=max(0.0, until - time.monotonic())):
+    while not one.acquire(timeout=min(_LOOK, max(0.0, until - time.monotonic()))):
+        _check_is_wanted()
+        if time.monotonic() < until:
+            continue
         raise NoAnswerError(
             f"other questions are being answered, for more than {allowance.seconds:g} s now; ask one after the other"
         )
@@ -152,14 +170,40 @@ def _run(task: dict[str, Any], allowance: Allowance, temporary: Path) -> tuple[b
         start_new_session=True,
     )
     try:
-        return process.communicate(timeout=allowance.seconds)
+        return _answered(process, allowance.seconds)
     except subprocess.TimeoutExpired:
         raise NoAnswerError(
-            f"gfor {' '.join(task['words'])}: no answer within {allowance.seconds:g} s; ask for less (one "
-            "scenario, fewer points, a check by its name), or start gfor mcp with a larger --seconds"
+            f"gfor {' '.join(task['words'])}: no answer within {allowance.seconds:g} s; {_remedy(task['words'])}"
+            f"who starts the server gives more time by gfor mcp --seconds {2 * allowance.seconds:g}"
         ) from None
     finally:
         _end(process)
+
+
+def _answered(process: "subprocess.Popen[bytes]", seconds: float) -> tuple[bytes, bytes]:
+    """Wait for what a command prints, as long as somebody wants it and it may take."""
+    until = time.monotonic() + seconds
+    while True:
+        left = until - time.monotonic()
+        try:
+            return process.communicate(timeout=min(_LOOK, max(0.0, left)))
+        except subprocess.TimeoutExpired:
+            if left <= _LOOK:
+                raise
+            _check_is_wanted()
+
+
+def _remedy(words: Sequence[str]) -> str:
+    """Return how a question that took too long can be asked for less; "" where it cannot."""
+    if words[0] == "screen":
+        return "the same question again goes on from what is done, and fewer outages or points take less; "
+    if words[:2] == ["fmu", "check"] and "--only" not in words:
+        return "`only` with one check's name takes less; "
+    if words[0] in ("modes", "scr") and "--scenario" not in words:
+        return "name one scenario: without it all are computed; "
+    if words[0] == "run":
+        return "a smaller `stop` takes less; "
+    return ""
 
 
 def _end(process: "subprocess.Popen[bytes]") -> None:

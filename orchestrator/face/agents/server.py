@@ -1,6 +1,7 @@
 """The verbs, offered over the Model Context Protocol with the official library."""
 
 import asyncio
+import json
 import time
 from collections.abc import Callable
 from functools import wraps
@@ -11,11 +12,11 @@ from mcp.server import MCPServer
 from mcp.server.mcpserver import Context
 from mcp.server.mcpserver.exceptions import ToolError, UnexpectedToolError
 from mcp.server.stdio import stdio_server
-from mcp.types import CallToolResult, InputRequiredResult, Tool, ToolAnnotations
+from mcp.types import CallToolResult, InputRequiredResult, TextContent, Tool, ToolAnnotations
 from pydantic import ValidationError
 
 from orchestrator.core.errors import CosimError
-from orchestrator.face.agents.question import Allowance
+from orchestrator.face.agents.question import Allowance, cancelled
 from orchestrator.face.agents.streams import Incoming, Open, Outgoing
 from orchestrator.face.agents.verbs import VERBS, Verbs
 
@@ -62,11 +63,13 @@ class VerbServer(MCPServer[Any]):
 
     seconds = 0.0
     patience = 0.0
+    questions: Open | None = None  # those that have no answer yet, where streams bring them
 
     async def run_stdio_async(self) -> None:
         """Serve until the client has ended and has its answers."""
         async with stdio_server() as (incoming, outgoing):
             questions, server = Open(self.patience), self._lowlevel_server
+            self.questions = questions
             told = Outgoing(outgoing, questions)
             heard = Incoming(incoming, outgoing, questions)
             await server.run(heard, told, server.create_initialization_options())
@@ -89,8 +92,10 @@ class VerbServer(MCPServer[Any]):
             )
         _check_names(name, arguments, schemas[name])
         telling = asyncio.create_task(self._tell_progress(name, context))
+        if self.questions is not None and context is not None:
+            cancelled.set(self.questions.cancelled(context.request_id))
         try:
-            return await super().call_tool(name, arguments, context)
+            return _in_short(await super().call_tool(name, arguments, context))
         except UnexpectedToolError:
             raise
         except ToolError as error:
@@ -106,6 +111,16 @@ class VerbServer(MCPServer[Any]):
             await asyncio.sleep(_TOLD_EVERY)
             since = time.monotonic() - begin
             await context.report_progress(since, None, f"{verb}: asked {since:.0f} s ago; {limit}")
+
+
+def _in_short(
+    answer: CallToolResult | InputRequiredResult,
+) -> CallToolResult | InputRequiredResult:
+    """Return an answer whose text is its JSON without blanks, of which the library's text is half."""
+    if isinstance(answer, CallToolResult) and answer.structured_content is not None:
+        text = json.dumps(answer.structured_content, ensure_ascii=False, separators=(",", ":"))
+        answer.content = [TextContent(type="text", text=text)]
+    return answer
 
 
 def _check_names(verb: str, given: dict[str, Any], schema: dict[str, Any]) -> None:

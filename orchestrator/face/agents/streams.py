@@ -1,12 +1,14 @@
 """The streams between a client and the server: what is no JSON is answered, and no question is left at the end."""
 
 import contextvars
+import threading
 from types import TracebackType
 from typing import Any, Self
 
 import anyio
 from mcp.shared.message import SessionMessage
 from mcp.types import (
+    INVALID_PARAMS,
     INVALID_REQUEST,
     PARSE_ERROR,
     ErrorData,
@@ -32,16 +34,24 @@ class Open:
     def __init__(self, seconds: float) -> None:
         self._seconds = seconds
         self._ids: set[int | str] = set()
+        self._cancelled: dict[str, threading.Event] = {}
         self._changed = anyio.Event()
 
     def came(self, message: Any) -> None:
         """Take a message of the client; one that it cancels gets no answer."""
         if isinstance(message, JSONRPCRequest):
             self._ids.add(message.id)
+            self._cancelled[str(message.id)] = threading.Event()
         elif isinstance(message, JSONRPCNotification) and message.method == _CANCELLED:
             cancelled = (message.params or {}).get("requestId")
             if isinstance(cancelled, int | str):
+                if str(cancelled) in self._cancelled:
+                    self._cancelled[str(cancelled)].set()
                 self._close(cancelled)
+
+    def cancelled(self, one: str) -> threading.Event | None:
+        """The event that is set once the client cancels a question; None where there is no such question."""
+        return self._cancelled.get(one)
 
     def went(self, message: Any) -> None:
         """Take a message of the server."""
@@ -58,6 +68,7 @@ class Open:
     def _close(self, one: int | str | None) -> None:
         if one is not None:
             self._ids.discard(one)
+            self._cancelled.pop(str(one), None)
         self._changed.set()
 
 
@@ -118,6 +129,10 @@ class Incoming(_Wrapped):
                 await self._questions.answered()
                 raise
             if not isinstance(item, Exception):
+                refusal = wrong_token(item.message)
+                if refusal is not None:
+                    await self._outgoing.send(SessionMessage(refusal))
+                    continue
                 self._questions.came(item.message)
                 message: SessionMessage = item
                 return message
@@ -131,6 +146,22 @@ class Incoming(_Wrapped):
             return await self.receive()
         except anyio.EndOfStream:
             raise StopAsyncIteration from None
+
+
+def wrong_token(message: Any) -> JSONRPCError | None:
+    """The answer to a question whose token of progress is none; the library says only that something is invalid."""
+    if not isinstance(message, JSONRPCRequest):
+        return None
+    about = (message.params or {}).get("_meta")
+    if not isinstance(about, dict) or "progressToken" not in about:
+        return None
+    token = about["progressToken"]
+    if isinstance(token, int | str) and not isinstance(token, bool):
+        return None
+    said = "_meta.progressToken: give a text or a whole number, or leave it out"
+    return JSONRPCError(
+        jsonrpc="2.0", id=message.id, error=ErrorData(code=INVALID_PARAMS, message=said)
+    )
 
 
 def _refusal(error: Exception) -> JSONRPCError:

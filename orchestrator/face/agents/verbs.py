@@ -49,7 +49,13 @@ MOST_ROWS = 20
 """Modes, buses, parameters or states that an answer lists: more than a reader compares, and few enough for an agent."""
 
 MOST_PARTS = 5
-"""States that take part in a mode, which `modes` lists: what follows is small."""
+"""States and machines of a mode that `modes` lists unless more are asked for: what follows is small."""
+
+USUAL_MODES = 5
+"""Modes that `modes` lists unless more are asked for: those that a case names, and the least damped."""
+
+MOST_MODES = 200
+"""Modes that it lists at most."""
 
 MOST_DECIDING = 3
 """Growing modes that an explanation names, the least damped first."""
@@ -98,19 +104,28 @@ class Verbs:
         scenario: str | None = None,
         values: Values | None = None,
         frequencies_hz: tuple[float, float] = ELECTROMECHANICAL_HZ,
+        most: int = USUAL_MODES,
+        parts: int = MOST_PARTS,
     ) -> ModesAnswer:
         """Compute modes of a case: frequency, damping, participation factors and mode shape, each with its own mode.
 
         ``values`` sets parameters first, such as {"grid.X_L": 0.3}. Without ``scenario`` the modes are those of the
         case's first one; the others are named with their verdicts. ``frequencies_hz``: lowest and highest frequency
-        [Hz] of the modes that are listed; those outside are counted.
+        [Hz] of the modes that are listed; those outside are counted. ``most`` modes are listed, up to 200: those that
+        the case names, and the least damped of the others, which are counted. ``parts``: states and machines that are
+        listed of each, up to 200, the largest first.
         """
         low, high = frequencies_hz
+        for name, number in (("most", most), ("parts", parts)):
+            if not 1 <= number <= MOST_MODES:
+                raise NoAnswerError(
+                    f"{name} = {number}: give a whole number from 1 to {MOST_MODES}"
+                )
         found = self._ask("modes", case, scenario, values, "--range", f"{low!r}:{high!r}")
         first, *others = found["scenarios"]
         return ModesAnswer(
             case=found["case"],
-            scenarios=[_scenario_modes(first, frequencies_hz)],
+            scenarios=[_scenario_modes(first, frequencies_hz, most, parts)],
             others={one["name"]: one["stability"]["sentence"] for one in others},
             questions=_first(found["questions"]),
         )
@@ -323,9 +338,10 @@ def _largest(parts: Mapping[str, float], most: int = MOST_ROWS) -> dict[str, flo
 
 
 def _scenario_modes(
-    one: Mapping[str, Any], frequencies_hz: tuple[float, float]
+    one: Mapping[str, Any], frequencies_hz: tuple[float, float], most: int, parts: int
 ) -> ScenarioModesAnswer:
-    modes = sorted(one["modes"], key=lambda mode: mode["damping_percent"])
+    every = sorted(one["modes"], key=lambda mode: (not mode["name"], mode["damping_percent"]))
+    modes = sorted(every[:most], key=lambda mode: mode["damping_percent"])
     outside = one.get("outside_range") or {"oscillatory_modes": None, "least_damped": None}
     return ScenarioModesAnswer(
         scenario=one["name"],
@@ -333,23 +349,25 @@ def _scenario_modes(
         verdict=one["stability"]["sentence"],
         eigenvalues=one["stability"]["eigenvalues"],
         frequency_range_hz=frequencies_hz,
-        modes=[_mode(mode) for mode in modes[:MOST_ROWS]],
-        left_out=max(0, len(modes) - MOST_ROWS),
+        modes=[_mode(mode, parts) for mode in modes],
+        left_out=len(every) - len(modes),
         outside_range=outside["oscillatory_modes"],
         least_damped_outside=outside["least_damped"],
     )
 
 
-def _mode(mode: Mapping[str, Any]) -> ModeAnswer:
+def _mode(mode: Mapping[str, Any], most: int) -> ModeAnswer:
     parts = {row["state"]: row["factor"] for row in mode["participation"]}
+    shape = _shape(mode["shape"])
     return ModeAnswer(
         name=mode["name"],
         frequency_hz=mode["frequency_hz"],
         damping_percent=mode["damping_percent"],
         real=mode["real"],
         imag=mode["imag"],
-        participation=_largest(parts, MOST_PARTS),
-        shape=_shape(mode["shape"]),
+        participation=_largest(parts, most),
+        shape=dict(islice(shape.items(), most)),
+        machines_left_out=max(0, len(shape) - most),
     )
 
 
@@ -362,7 +380,7 @@ def _shape(rows: Iterable[Mapping[str, Any]]) -> dict[str, tuple[float, float]]:
             row["magnitude"] / ordered[0]["magnitude"],
             (row["angle_deg"] - ordered[0]["angle_deg"] + 180) % 360 - 180,
         )
-        for row in ordered[:MOST_ROWS]
+        for row in ordered
     }
 
 

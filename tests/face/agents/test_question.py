@@ -5,6 +5,7 @@ import json
 import subprocess
 import sys
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import chdir, redirect_stderr, redirect_stdout, suppress
 
@@ -248,6 +249,77 @@ def test_modes_outside_of_the_range_are_counted_and_can_be_asked_for(tmp_path, m
     assert (usual.outside_range, usual.least_damped_outside.frequency_hz) == (9, 3.12346)
     Verbs(allowance(tmp_path)).modes("kundur", frequencies_hz=(0.5, 60.0))
     assert [words[words.index("--range") + 1] for words in asked] == ["0.1:2.0", "0.5:60.0"]
+
+
+def test_an_answer_lists_the_worst_modes_and_counts_the_rest(tmp_path, monkeypatch):
+    """An answer on the 118-bus system had 44,734 characters."""
+    machines = [
+        {"state": f"sg{k}.machine.omega", "magnitude": 1 / k, "angle_deg": 0.0} for k in (1, 2, 3)
+    ]
+    parts = [{"state": row["state"], "factor": row["magnitude"] / 2} for row in machines]
+    modes = [
+        {"name": "named" if k == 8 else None, "damping_percent": float(k), "frequency_hz": 1.0}
+        | {"real": -1.0, "imag": 6.0, "participation": parts, "shape": machines}
+        for k in range(9)
+    ]
+    one = {"name": "gfor", "stable": True, "modes": modes}
+    one["stability"] = {"sentence": "stable", "eigenvalues": 82}
+    content = {"case": "ieee118", "scenarios": [one], "questions": []}
+    monkeypatch.setattr(verbs, "ask", lambda words, _: content)
+    asked = Verbs(allowance(tmp_path))
+    (usual,) = asked.modes("ieee118", parts=2).scenarios
+    assert [mode.damping_percent for mode in usual.modes] == [0, 1, 2, 3, 8]
+    assert usual.left_out == 4
+    assert list(usual.modes[0].shape) == ["sg1", "sg2"]
+    assert (len(usual.modes[0].participation), usual.modes[0].machines_left_out) == (2, 1)
+    (every,) = asked.modes("ieee118", most=200).scenarios
+    assert (len(every.modes), every.left_out, every.modes[0].machines_left_out) == (9, 0, 0)
+    with pytest.raises(NoAnswerError, match="most = 0: give a whole number from 1 to 200"):
+        asked.modes("ieee118", most=0)
+
+
+@pytest.fixture
+def unwanted():
+    """A question that its client has cancelled."""
+    event = threading.Event()
+    event.set()
+    token = question.cancelled.set(event)
+    yield
+    question.cancelled.reset(token)
+
+
+def test_a_cancelled_question_ends_and_gives_its_turn_away(tmp_path, unwanted):
+    """It went on computing for 92 s, and kept its turn."""
+    sleeping = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+    try:
+        with pytest.raises(NoAnswerError, match="it was cancelled"):
+            question._answered(sleeping, 60.0)
+    finally:
+        sleeping.kill()
+        sleeping.wait()
+    taken = threading.BoundedSemaphore(1)
+    with (
+        taken,
+        pytest.raises(NoAnswerError, match="it was cancelled"),
+        question._turn(taken, time.monotonic() + 60.0, allowance(tmp_path)),
+    ):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("words", "remedy"),
+    [
+        (["screen", "two_area", "--scenario", "gfor"], "goes on from what is done"),
+        (["modes", "two_area", "--json"], "name one scenario: without it all are computed; "),
+        (["modes", "two_area", "--scenario", "gfor"], ""),
+        (["fmu", "check", "a.fmu"], "`only` with one check's name takes less; "),
+        (["run", "two_area"], "a smaller `stop` takes less; "),
+    ],
+)
+def test_a_question_that_took_too_long_gets_a_remedy_that_is_left(words, remedy):
+    told = question._remedy(words)
+    assert remedy in told
+    assert bool(remedy) == bool(told)
 
 
 def test_every_figure_of_an_answer_has_six_digits():

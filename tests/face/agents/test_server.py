@@ -15,6 +15,7 @@ from tests.support.late import LateLibrary
 
 mcp, streams = LateLibrary("mcp"), LateLibrary("mcp.client.stdio")
 owner = LateLibrary("orchestrator.face.agents.server")  # which imports mcp
+ours = LateLibrary("orchestrator.face.agents.streams")  # as well
 exceptions = LateLibrary("mcp.server.mcpserver.exceptions")
 
 VERBS = {
@@ -241,3 +242,31 @@ def test_a_value_that_is_none_is_refused_in_one_sentence(tmp_path, value):
         match=r"^modes: values\.gfor\.pod_p\.K: give a finite number, true or false, or a text such as '200 MW'$",
     ):
         anyio.run(server.call_tool, "modes", given)
+
+
+@pytest.mark.parametrize(
+    ("token", "is_refused"),
+    [("a", False), (7, False), (True, True), (1.5, True), (None, True), ({"a": 1}, True)],
+)
+def test_a_token_of_progress_that_is_none_is_refused_in_words(token, is_refused):
+    """The library says "Invalid request parameters", and not which."""
+    given = {"name": "cases", "_meta": {"progressToken": token}}
+    message = ours.JSONRPCRequest(jsonrpc="2.0", id=4, method="tools/call", params=given)
+    refusal = ours.wrong_token(message)
+    assert (refusal is not None) == is_refused
+    if refusal is not None:
+        assert (refusal.id, refusal.error.code) == (4, ours.INVALID_PARAMS)
+        assert refusal.error.message.startswith("_meta.progressToken: give a text")
+
+
+def test_a_cancel_reaches_the_question_that_it_names():
+    questions = ours.Open(1.0)
+    questions.came(ours.JSONRPCRequest(jsonrpc="2.0", id=4, method="tools/call", params={}))
+    event = questions.cancelled("4")
+    assert not event.is_set()
+    told = {"requestId": 4}
+    questions.came(
+        ours.JSONRPCNotification(jsonrpc="2.0", method="notifications/cancelled", params=told)
+    )
+    assert event.is_set()
+    assert questions.cancelled("4") is None
