@@ -19,13 +19,20 @@ if TYPE_CHECKING:
 _CHOICES = re.compile(r"\b0: .*\b1: ")
 
 
+def as_written(value: object) -> str:
+    """Return a value as a case file or an option has it: ``true``, ``50``, ``'half'``."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:.15g}" if isinstance(value, float) else repr(value)
+
+
 def convert(info: VariableInfo, value: Value) -> float | bool:
     if info.type == "Boolean":
         if isinstance(value, bool):
             return value
-        raise ValueError(f"{info.name} = {value!r}; it must be true or false")
+        raise ValueError(f"{info.name} = {as_written(value)}; it must be true or false")
     if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise ValueError(f"{info.name} = {value!r}; it must be a number")
+        raise ValueError(f"{info.name} = {as_written(value)}; it must be a number")
     unit = f" {info.unit}" if info.unit not in ("", "1") else ""
     choices = f" ({info.description})" if _CHOICES.search(info.description) else ""
     try:

@@ -13,7 +13,14 @@ from orchestrator.cases.draft import Draft
 from orchestrator.cases.form.control_limits import is_limit, is_wider
 from orchestrator.cases.form.names import SERVICE, STATES, close_names, hint_at, whose
 from orchestrator.cases.form.schema import ConventionsTable, Value
-from orchestrator.cases.form.values import TWICE, check_system_base, convert, flatten, given_twice
+from orchestrator.cases.form.values import (
+    TWICE,
+    as_written,
+    check_system_base,
+    convert,
+    flatten,
+    given_twice,
+)
 from orchestrator.cases.settings.imperfection_tables import sets_imperfection
 from orchestrator.devices.fmi.description import VariableInfo
 
@@ -198,9 +205,7 @@ def _switch(draft: Draft, key: str, value: Value) -> str:
         return ""
     (name, variable), state = found[0], STATES.get(str(value).lower())
     if state is None:
-        return (
-            f"{word} = {value!r}; it must be true or false; {item} is switched by {name}.{variable}"
-        )
+        return f"{word} = {as_written(value)}; it must be true or false; {item} is switched by {name}.{variable}"
     on = state != (word in ("out", "off"))
     text = str(int(on)) if variable.endswith("scale") else str(on).lower()
     return f"{item} is switched {'on' if on else 'off'} by {name}.{variable}={text}; write that"

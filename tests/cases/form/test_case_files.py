@@ -231,7 +231,7 @@ def test_a_file_without_what_nothing_can_be_checked_without(written, text, expec
         (
             "K = -3.0",
             "K = true",
-            "line 10, components.k.parameters.K: K = True; it must be a number",
+            "line 10, components.k.parameters.K: K = true; it must be a number",
         ),
         (
             "K = -3.0",

@@ -217,10 +217,10 @@ def test_modes_as_a_table_with_overrides_and_a_step(gfor):
         ),
         (["--set", "grid.X_L=1 MW"], "--set grid.X_L: X_L: '1 MW' is in MW, but pu is needed"),
         (["--set", "grid.X_L=-1"], "--set grid.X_L: X_L = -1 pu; it must be at least 1e-05 pu"),
-        (["--set", "grid.X_L=true"], "--set grid.X_L: X_L = True; it must be a number"),
+        (["--set", "grid.X_L=true"], "--set grid.X_L: X_L = true; it must be a number"),
         (
             ["--set", "gfor.pod_p.enabled=2"],
-            "--set gfor.pod_p.enabled: pod_p.enabled = 2.0; it must be true or false",
+            "--set gfor.pod_p.enabled: pod_p.enabled = 2; it must be true or false",
         ),
         (
             ["--set", "sg1.omega=1"],
