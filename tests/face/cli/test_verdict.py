@@ -90,7 +90,8 @@ def test_a_sweep_names_the_points_that_grow(tmp_path, capsys):
     code, text = output(capsys, *words, "--workers", "1", "--fail-unstable")
     assert code == 1
     first = text.splitlines()[0]
-    assert first.startswith("UNSTABLE: SG + GFOR: at 1 of 2 points; worst at gfor.droop.R_f = 10 ")
+    assert first.startswith("UNSTABLE: SG + GFOR: at 1 of 2 points; least damping at gfor.droop.")
+    assert "; worst at gfor.droop.R_f = 10 pu: " in first
     assert first.endswith(
         "; stable at gfor.droop.R_f = 0.05 pu, unstable at gfor.droop.R_f = 10 pu"
     )
