@@ -50,7 +50,7 @@ def test_a_choice_is_no_value_of_the_scenario():
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"gfor.native": 1.0}, "--set gfor.native: native = 1; it must be true or false"),
+        ({"gfor.native": 1.0}, "--set gfor.native: native = 1.0; it must be true or false"),
         ({"gfor.native": "yes"}, "--set gfor.native: native = 'yes'; it must be true or false"),
         ({"gfr.native": True}, "--set gfr.native: there is no component 'gfr'"),
         # this case has no units
