@@ -1,7 +1,8 @@
 """One finding about a run, in words and for programs."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from math import ceil
 from typing import Any, Literal
 
 Kind = Literal[
@@ -59,6 +60,18 @@ INTERRUPTION: Kind = "interruption"
 BENCH_RESONANCE: Kind = "bench_resonance"
 
 
+_ROUNDING = 1e-9  # part of a hundredth by which a whole one may be missed in floats
+
+
+def rounded_up(time: float) -> float:
+    """Round a time up to whole hundredths [s]: a run that is told to stop there is not shorter than it."""
+    return ceil(100 * time - _ROUNDING) / 100
+
+
+def go_on_to(time: float) -> str:
+    return f"let the run go on to t = {time:.12g} s"
+
+
 @dataclass(frozen=True, slots=True)
 class Finding:
     kind: Kind
@@ -73,6 +86,15 @@ class Finding:
     figures: Mapping[str, float] = field(default_factory=dict)
     represented: bool = True  # False of a limit that would act and that the model lacks
     what: str = ""  # of a limit, what it is: "limiter of overexcitation"
+    # stop of a longer run that shows what this one does not [s], as the message has it; None where none is told
+    enough: float | None = None
+
+    def asking_for(self, stop: float) -> "Finding":
+        """Return the finding, its message with a longer stop [s] where it tells one."""
+        if self.enough is None or stop <= self.enough:
+            return self
+        message = self.message.replace(go_on_to(self.enough), go_on_to(stop))
+        return replace(self, message=message, enough=stop)
 
     def as_json(self) -> dict[str, Any]:
         return {

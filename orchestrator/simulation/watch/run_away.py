@@ -7,7 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Numbers
-from orchestrator.simulation.watch.finding import EXCURSION, NOT_JUDGED, Finding
+from orchestrator.simulation.watch.finding import (
+    EXCURSION,
+    NOT_JUDGED,
+    Finding,
+    go_on_to,
+    rounded_up,
+)
 from orchestrator.simulation.watch.seen import Seen, shown_name, unit
 from orchestrator.simulation.watch.settings import Settings
 from orchestrator.simulation.watch.stretches import Stretch
@@ -225,8 +231,9 @@ def _excursion(times: Numbers, course: _Course, others: int) -> Finding:
         message += " and moves away again" if leaves else ""
         enough = float(times[last]) + LONG if leaves else back + BACK
     is_back = enough <= times[last]
+    enough = rounded_up(enough)
     if not is_back:
-        message = f"whether the frequency settles is not judged: {message}; let the run go on to t = {enough:.4g} s"
+        message = f"whether the frequency settles is not judged: {message}; {go_on_to(enough)}"
     component, _, variable = course.name.partition(".")
     return Finding(
         EXCURSION if is_back else NOT_JUDGED,
@@ -236,6 +243,7 @@ def _excursion(times: Numbers, course: _Course, others: int) -> Finding:
         message=message,
         until=back,
         figures={"value": value, "outside_s": lasts},
+        enough=None if is_back else enough,
     )
 
 
@@ -298,10 +306,11 @@ def still_moving_away(
         enough = max(enough, last.end + drift.time_constant)
     elif enough <= last.end:
         enough = last.end + LONG
+    enough = rounded_up(enough)
     how += f", with {' and '.join(held)} at the limit of the governor" if held else ""
     message = (
         f"whether the frequency settles is not judged: the mean of all speeds is {mean[-1]:.4g} pu at "
-        f"t = {last.end:.4g} s and moves away at {rate:+.3g} pu/s, {how}; let the run go on to t = {enough:.4g} s"
+        f"t = {last.end:.4g} s and moves away at {rate:+.3g} pu/s, {how}; {go_on_to(enough)}"
     )
     component, _, variable = largest.name.partition(".")
     figures = {"value": float(mean[-1]), "rate": rate}
@@ -314,6 +323,7 @@ def still_moving_away(
             message=message,
             until=None,
             figures=figures,
+            enough=enough,
         )
     ]
 

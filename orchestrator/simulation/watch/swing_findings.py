@@ -1,5 +1,7 @@
 """Findings on a swing that does not decay, and since when it swings like that."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from orchestrator.simulation.watch.confirmation import (
@@ -11,7 +13,7 @@ from orchestrator.simulation.watch.confirmation import (
     rises,
     rms,
 )
-from orchestrator.simulation.watch.finding import NOT_JUDGED, Finding, Kind
+from orchestrator.simulation.watch.finding import NOT_JUDGED, Finding, Kind, go_on_to, rounded_up
 from orchestrator.simulation.watch.oscillation import Oscillation, too_fast
 from orchestrator.simulation.watch.seen import shown_name
 from orchestrator.simulation.watch.stretches import Stretch
@@ -63,20 +65,24 @@ def doubtful_swing(swing: Swing, oscillation: Oscillation, why: str, stretch: St
     """A remark on an oscillation that may decay, with the reason of the doubt.
 
     ``why``: the reason; see `confirmation.doubt`."""
+    enough = _enough(swing, oscillation, stretch)
     seems = "grow" if change(swing, oscillation.rate) > STEADY else "last"
     message = (
         f"whether the response to t = {stretch.begin:.4g} s settles is not judged: {shown_name(swing.name)} swings at "
         f"{oscillation.frequency_hz:.4g} Hz and seems to {seems} ({oscillation.rate:+.3g} 1/s until {_end(stretch)}), "
-        f"but {why}; {_remedy(swing, oscillation, stretch)}"
+        f"but {why}; {_remedy(enough)}"
     )
-    return _finding(NOT_JUDGED, stretch.begin, swing, message, oscillation, stretch)
+    finding = _finding(NOT_JUDGED, stretch.begin, swing, message, oscillation, stretch)
+    return replace(finding, enough=enough)
 
 
-def _remedy(swing: Swing, oscillation: Oscillation | None, stretch: Stretch) -> str:
-    end = needed_end(swing, oscillation)
-    return (
-        f"let the run go on to t = {end:.3g} s" if stretch.last else "give the events more distance"
-    )
+def _enough(swing: Swing, oscillation: Oscillation | None, stretch: Stretch) -> float | None:
+    """Stop of a run that shows the swing for long enough [s]; None where an event ends it."""
+    return rounded_up(needed_end(swing, oscillation)) if stretch.last else None
+
+
+def _remedy(enough: float | None) -> str:
+    return "give the events more distance" if enough is None else go_on_to(enough)
 
 
 def irregular_swing(swing: Swing, unit: str, stretch: Stretch) -> Finding:
@@ -96,15 +102,15 @@ def doubtful_irregular_swing(swing: Swing, why: str, unit: str, stretch: Stretch
     """A remark on a swing at no single frequency that may decay, with the reason of the doubt.
 
     ``why``: the reason; see `confirmation.irregular_doubt`."""
-    amplitude = _irregular_amplitude(swing)
+    amplitude, enough = _irregular_amplitude(swing), _enough(swing, None, stretch)
     message = (
         f"whether the response to t = {stretch.begin:.4g} s settles is not judged: {shown_name(swing.name)} swings by "
         f"about {amplitude:.3g} {unit} at {_end(stretch)}, at no single frequency, but {why}; "
-        f"{_remedy(swing, None, stretch)}"
+        f"{_remedy(enough)}"
     )
-    place = _place(swing.name)
+    place, figures = _place(swing.name), {"amplitude": amplitude}
     return Finding(
-        NOT_JUDGED, stretch.begin, *place, message, _until(stretch), {"amplitude": amplitude}
+        NOT_JUDGED, stretch.begin, *place, message, _until(stretch), figures, enough=enough
     )
 
 

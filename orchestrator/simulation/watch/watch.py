@@ -13,7 +13,14 @@ from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import ComponentError, CosimError, NotFiniteError
 from orchestrator.devices.binding.misfits import Misfit
 from orchestrator.simulation.watch.confirmation import KnownModes
-from orchestrator.simulation.watch.finding import MISFIT, UNSTABLE, Finding, Kind
+from orchestrator.simulation.watch.finding import (
+    MISFIT,
+    UNSTABLE,
+    Finding,
+    Kind,
+    go_on_to,
+    rounded_up,
+)
 from orchestrator.simulation.watch.interruptions import interruption_signals, interruptions
 from orchestrator.simulation.watch.limits import above_declared, active_limits, limit_signals
 from orchestrator.simulation.watch.own_trips import own_trip_signals, own_trips
@@ -69,18 +76,14 @@ def too_short(stretches: Sequence[Stretch]) -> list[Finding]:
         for s in stretches
     )
     last = stretches[-1]
-    remedy = (
-        f"let the run go on to t = {last.begin + SETTLING:.4g} s"
-        if last.last
-        else "give the events more distance"
-    )
+    enough = rounded_up(last.begin + SETTLING) if last.last else None
+    remedy = "give the events more distance" if enough is None else go_on_to(enough)
     message = (
         f"whether the response settles is not judged {spans}: what an event excites may still decay after less than "
         f"{SETTLING:g} s; {remedy}"
     )
-    return [
-        Finding("not_judged", stretches[0].begin, "", "", message, None if last.last else last.end)
-    ]
+    until = None if last.last else last.end
+    return [Finding("not_judged", stretches[0].begin, "", "", message, until, enough=enough)]
 
 
 def still_departing(seen: Seen, system: System, stretches: Sequence[Stretch]) -> list[Finding]:

@@ -3,17 +3,14 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import ceil, exp
 
 from orchestrator.core.errors import RunInterruptedError, few
 from orchestrator.core.options import Option
 from orchestrator.linear.spectra.modes import Mode
-from orchestrator.simulation.watch.confirmation import PERIODS
 from orchestrator.simulation.watch.finding import (
     EXCURSION,
     INTERRUPTION,
     LIMIT,
-    NOT_JUDGED,
     STALL,
     TRIP,
     Finding,
@@ -21,36 +18,19 @@ from orchestrator.simulation.watch.finding import (
 )
 from orchestrator.simulation.watch.own_trips import OWN_TRIPS
 from orchestrator.studies.modes.modes import ModesResult
-from orchestrator.studies.runs.after_events import lasting_changes, same_mode
+from orchestrator.studies.runs.after_events import same_mode
 from orchestrator.studies.runs.answer import ScenarioAnswer
-from orchestrator.studies.runs.answer_of_modes import (
-    least_damped,
-    of_modes,
-    swing_of,
-    with_misfits,
+from orchestrator.studies.runs.answer_of_modes import of_modes, swing_of, with_misfits
+from orchestrator.studies.runs.long_enough import (
+    UNDECIDED,
+    deciding,
+    growth_shows_from,
+    longer_run,
+    seen_from,
 )
 from orchestrator.studies.runs.run import RunResult
 from orchestrator.studies.runs.settling import has_settled
 from orchestrator.systems.coupling.events import Forcing
-
-_UNDECIDED = 0.5
-"""Damping after the events [%], of either sign, that decides nothing beside a run that is long enough: what the events
-leave is computed from a power flow, which the run does not reach exactly."""
-
-_NO_RUN_NEEDED = 4.0
-"""Damping after the events [%] from which on no run need be long enough to show a growth."""
-
-_PERIODS_OF_A_SLOW_GROWTH = 30
-"""Periods in which a run shows whether a mode grows that hardly decays."""
-
-_LONGER = 1.5
-"""Part of the time since the last event that a run whose end is not judged goes on to at least."""
-
-_DECAYED = 3.0
-"""Time constants after which a mode leaves 5 %: what moves the response then is no swing that decays."""
-
-_SLOWEST = 0.05
-"""Decay [1/s] at least of a mode whose decay a run is told to wait for: a minute; a slower one is not awaited."""
 
 _TRIPS_NAMED = 2  # trips of relays that an answer names; the others are counted
 
@@ -160,7 +140,7 @@ def _of_run(result: RunResult) -> ScenarioAnswer:
     after = result.after
     if not isinstance(after, ModesResult):
         return answer
-    left, swing = of_modes(after), _deciding(after)
+    left, swing = of_modes(after), deciding(after)
     if swing is not None and _is_undecided(result, answer, swing):
         if answer.good:
             told = (
@@ -177,9 +157,9 @@ def _of_run(result: RunResult) -> ScenarioAnswer:
 def _is_undecided(result: RunResult, answer: ScenarioAnswer, swing: Mode) -> bool:
     """Tell whether the mode after the events decides nothing: near zero, or growing where a long run shows none."""
     damping = swing.damping_percent
-    if damping >= _UNDECIDED:
+    if damping >= UNDECIDED:
         return False
-    return damping > -_UNDECIDED or _settles(result, answer, swing)
+    return damping > -UNDECIDED or _settles(result, answer, swing)
 
 
 def _with_after(
@@ -275,8 +255,10 @@ def _of_an_early_stop(shown: _Response) -> ScenarioAnswer | None:
 def _of_a_response_not_judged(shown: _Response) -> ScenarioAnswer | None:
     if shown.result.stable_in_simulation is not None:
         return None
-    longer = _of_a_longer_run(shown)
-    return shown.not_known(f"not judged throughout; the findings say where and why{longer}")
+    result = shown.result
+    longer = longer_run(result.modes, result.after, result.findings)
+    further = "" if longer is None else f"; {longer.in_words}"
+    return shown.not_known(f"not judged throughout; the findings say where and why{further}")
 
 
 def _of_modes_not_known(shown: _Response) -> ScenarioAnswer | None:
@@ -303,7 +285,7 @@ def _of_a_forcing(shown: _Response) -> ScenarioAnswer | None:
 
 
 def _of_a_short_run(shown: _Response) -> ScenarioAnswer | None:
-    wanted = _seen_from(shown.result, shown.by_modes.mode)
+    wanted = seen_from(shown.result.modes, shown.result.after)
     if wanted <= shown.end:
         return None
     return shown.not_known(
@@ -341,64 +323,7 @@ _RULES: tuple[Callable[[_Response], ScenarioAnswer | None], ...] = (
 what leaves an answer open before a good one."""
 
 
-# -- how long a run has to be ---------------------------------------------------------------------
-
-
-def _seen_from(result: RunResult, mode: Mode | None) -> float:
-    """Time from which on a growth shows [s], where the modes of what the events leave do not exclude it; else 0."""
-    if mode is None or not lasting_changes(result.modes.prepared):
-        return 0.0
-    after = result.after if isinstance(result.after, ModesResult) else None
-    swing = None if after is None else _deciding(after)
-    damping = None if swing is None else swing.damping_percent
-    judged = after is not None and after.stability.stable is not None
-    if judged and (damping is None or damping >= _NO_RUN_NEEDED):
-        return 0.0
-    slow = damping is not None and abs(damping) < _UNDECIDED
-    return _after(result, swing or mode, _PERIODS_OF_A_SLOW_GROWTH if slow else PERIODS)
-
-
-def _of_a_longer_run(shown: _Response) -> str:
-    """Tell until when a run should go on whose end is not judged, and what is left then; "" where only stretches
-    between events are not."""
-    result = shown.result
-    if all(one.until is not None for one in _of_kind(result, NOT_JUDGED)):
-        return ""
-    last = max((event.time for event in result.modes.prepared.events), default=0.0)
-    longer = last + _LONGER * (shown.end - last)
-    after = result.after if isinstance(result.after, ModesResult) else None
-    mode = shown.by_modes.mode if after is None else _deciding(after)
-    decayed = 0.0
-    if mode is not None and mode.is_oscillation:
-        decayed = last + _DECAYED / max(-mode.eigenvalue.real, _SLOWEST)
-    if mode is None or decayed <= longer:
-        return f"; {Option.STOP} {ceil(longer):g} goes on"
-    left = 100 * exp(mode.eigenvalue.real * (decayed - last))
-    named = f"the least damped mode, {mode.frequency_hz:.3g} Hz with {mode.damping_percent:.2g} %"
-    return (
-        f"; {Option.STOP} {ceil(decayed):g} goes on until {named}, leaves {left:.0f} % of its swing"
-    )
-
-
-def _after(result: RunResult, mode: Mode, periods: float) -> float:
-    """Return the time that is so many periods of a mode after the last event [s], in whole tenths."""
-    last = max(event.time for event in result.modes.prepared.events)
-    return ceil(10 * (last + periods / mode.frequency_hz)) / 10
-
-
 def _settles(result: RunResult, answer: ScenarioAnswer, swing: Mode) -> bool:
     """Tell whether a run that is long enough to show a growth of the mode shows none."""
-    seen = _after(result, swing, _PERIODS_OF_A_SLOW_GROWTH)
+    seen = growth_shows_from(result.modes, swing)
     return bool(answer.good) and result.modes.prepared.stop_time >= seen
-
-
-def _deciding(after: ModesResult) -> Mode | None:
-    """Return the least damped mode after the events, where it swings and nothing else grows.
-
-    What is left has voltages and powers of a power flow, where an event leaves references and admittances as they were:
-    a mode's damping was up to 3 points off in systems that were tuned for it."""
-    least = least_damped(after)
-    grows = after.stability.mode if after.stability.stable is False else least
-    if least is None or grows is None or not least.is_oscillation:
-        return None
-    return least if grows.eigenvalue == least.eigenvalue else None

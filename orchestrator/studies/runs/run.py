@@ -45,6 +45,7 @@ from orchestrator.studies.modes.modes import ModesResult, modes_of, running, unk
 from orchestrator.studies.runs.after_events import modes_after
 from orchestrator.studies.runs.checkpoint_mark import computed
 from orchestrator.studies.runs.checkpoints import Checkpoints
+from orchestrator.studies.runs.long_enough import with_one_stop
 from orchestrator.studies.runs.ring_down import ring_down_of
 from orchestrator.systems.coupling.bus_relays import Nearness, Trip
 from orchestrator.systems.coupling.master import Master
@@ -215,6 +216,8 @@ def _run(
     dataset, failure = _recorded(watch, prepared, recording, failure)
     known, later = _exact_eigenvalues(modes), _exact_eigenvalues(after)
     findings = watch.findings(failure, master.late_starts, modes.misfits, known, later, trips=trips)
+    if failure is None:
+        findings = with_one_stop(modes, after, findings)
     ring_down, why_none = (None, "") if failure else ring_down_of(modes, dataset, findings, after)
     not_known = [after] if isinstance(after, str) else []
     about_run = (
