@@ -82,6 +82,7 @@ class Explanation:
     stands_in: bool = (
         False  # whether it may only stand for a limit of the current that the model lacks
     )
+    behind_question: bool = False  # whether a yes to what is asked leaves clearly less
 
     @property
     def share(self) -> float:
@@ -97,6 +98,11 @@ class Explanation:
         Of an error that is hardly beyond the scatter, none does: a freedom more takes a little of any noise."""
         ruled_out = self.outdone or self.stands_in or self.hardly_beyond
         return self.share >= EXPLAINS and not ruled_out
+
+    @property
+    def is_likely(self) -> bool:
+        """Return whether it explains most of the error, and no yes to what is asked explains clearly more."""
+        return self.explains and not self.behind_question
 
     @property
     def hardly_beyond(self) -> bool:
@@ -147,6 +153,10 @@ class Explanation:
         """Return whether the recordings hardly tell it apart from the cause that leaves the least."""
         return self.left < max(_HARDLY_APART * best.left, best.noise)
 
+    def leaves_clearly_more(self, left: float) -> bool:
+        """Return whether it leaves clearly more than this [pu of the rating], and more than the scatter."""
+        return self.left >= max(_HARDLY_APART * left, self.noise)
+
     def as_json(self) -> dict[str, Any]:
         return {
             "cause": str(self.cause),
@@ -159,7 +169,8 @@ class Explanation:
             "rms_now_pu": self.error,
             "rms_left_pu": self.left,
             "share": self.share,
-            "explains": self.explains,
+            "explains": self.is_likely,
+            "behind_question": self.behind_question,
             "leaves_much": self.leaves_much,
             "noise_pu": self.noise,
             "hardly_beyond_noise": self.hardly_beyond,

@@ -217,6 +217,7 @@ def _causes_said(result: ValidationResult) -> str:
         in_step=result.explained_in_step,
         plain=result.plain_part,
         unreached=result.unreached,
+        first=result.asked_first,
     )
 
 

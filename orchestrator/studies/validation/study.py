@@ -12,6 +12,7 @@ from orchestrator.core.errors import CosimError, InputError
 from orchestrator.core.late import xr
 from orchestrator.core.options import Option
 from orchestrator.core.threads import one_thread
+from orchestrator.studies.validation.asked_first import AskedFirst, asked_before
 from orchestrator.studies.validation.beside import WindowApart, models_apart
 from orchestrator.studies.validation.between_samples import with_doubt_between
 from orchestrator.studies.validation.causes import EXPLAINS, CauseSearch, Explanation
@@ -135,6 +136,8 @@ class ValidationResult:
     fit: Fit | None = None
     confirmations: Sequence[FitCheck] = field(default=())
     explanations: Sequence[Explanation] = field(default=())
+    # questions that explain more than these
+    asked_first: AskedFirst | None = None
     explained_in_step: bool = False  # whether the model was held in step for them
     unreached: Sequence[str] = field(default=())  # limits beside it of which nothing is seen
     plain_part: PlainPart | None = None  # up to where the first of them holds without that
@@ -244,9 +247,11 @@ def _validate(request: ValidationRequest, report: Report) -> ValidationResult:
         result = add_verdict(replace(result, comparisons=answered))
         lacking = any(one.lacks_limit for one in comparisons)
         causes = [replace(c, stands_in=lacking and c.leaves_much) for c in search.causes]
+        first = asked_before(result.comparisons, causes)
         result = replace(
             result,
-            explanations=causes,
+            explanations=[replace(c, behind_question=first is not None) for c in causes],
+            asked_first=first,
             explained_in_step=search.held,
             interrupted=not search.finished,
         )

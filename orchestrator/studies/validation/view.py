@@ -134,11 +134,21 @@ class Validation:
             return {}
         part = self.result.plain_part
         return {
+            "asked_first": self._asked_json(),
             "explanations": [one.as_json() for one in self.result.explanations],
             "explained_in_step": self.result.explained_in_step,
             "unreached_limits": list(self.result.unreached),
             "explained_plainly": None if part is None else part.as_json(),
         }
+
+    def _asked_json(self) -> dict[str, Any] | None:
+        first = self.result.asked_first
+        if first is None:
+            return None
+        asked = [
+            {"recording": label, **_question_json(question)} for label, question in first.asked
+        ]
+        return {"questions": asked, "rms_now_pu": first.error, "rms_left_pu": first.left}
 
     def _fit_json(self) -> dict[str, Any]:
         fit = self.result.fit
@@ -286,6 +296,7 @@ def parts(found: Validation) -> Iterator[RenderableType]:
             in_step=result.explained_in_step,
             plain=result.plain_part,
             unreached=result.unreached,
+            first=result.asked_first,
         )
         yield escape(said)
     if result.explanations and not nothing_to_explain(result.explanations):

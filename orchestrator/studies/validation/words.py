@@ -8,6 +8,7 @@ from orchestrator.core.errors import number_of
 from orchestrator.core.options import Option
 from orchestrator.core.units import whole_percent
 from orchestrator.linear.signals.identification import IdentifiedMode
+from orchestrator.studies.validation.asked_first import AskedFirst
 from orchestrator.studies.validation.beside import WindowApart
 from orchestrator.studies.validation.causes import CauseKind, Explanation, nothing_to_explain
 from orchestrator.studies.validation.device import PlayedDevice
@@ -468,7 +469,9 @@ def _likely(one: Explanation) -> str:
         return "no: the model lacks a limit"
     if one.hardly_beyond:
         return "no: the error is hardly more than noise"
-    return "yes" if one.explains else "no"
+    if one.explains:
+        return "only if the answer is no" if one.behind_question else "yes"
+    return "no"
 
 
 def explanation_sentence(
@@ -478,9 +481,11 @@ def explanation_sentence(
     in_step: bool = False,
     plain: PlainPart | None = None,
     unreached: Sequence[str] = (),
+    first: AskedFirst | None = None,
 ) -> str:
     """Name the cause that explains the most, and those that explain nearly as much.
 
+    ``first``: what explains more than they do if the answer is yes;
     ``finished``: whether all causes were tried; ``in_step``: whether the model was held in step for them; ``plain``: up
     to where the first one holds without that; ``unreached``: limits beside it that the model does not reach with it."""
     if nothing_to_explain(explanations):
@@ -496,6 +501,8 @@ def explanation_sentence(
             f" With it the model does not come near {' and '.join(unreached)}: the recording does not tell whether "
             "that is right."
         )
+    if first is not None:
+        said = f"{_said_of_questions(first)} If the answer is no, {said[0].lower()}{said[1:]}"
     return said if finished else f"Interrupted before all causes were tried. {said}"
 
 
@@ -506,6 +513,12 @@ def _said_of_noise(one: Explanation) -> str:
         f"{one.error:.3g} pu (rms), hardly more than the recording's own noise of {one.noise:.3g} pu. No cause is "
         "likely."
     )
+
+
+def _said_of_questions(first: AskedFirst) -> str:
+    """Say what is asked as the likeliest explanation."""
+    asked = "; of ".join(f"{label}: {sentence(question)}" for label, question in first.asked)
+    return f"The likeliest explanation is a yes to what is asked of {asked}."
 
 
 def _plainly(part: PlainPart) -> str:

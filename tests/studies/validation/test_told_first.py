@@ -10,6 +10,7 @@ import pytest
 from rich.console import Console
 
 from orchestrator.core.errors import ComponentError
+from orchestrator.studies.validation.asked_first import AskedFirst
 from orchestrator.studies.validation.causes import CauseKind, Explanation, without_worse_ways
 from orchestrator.studies.validation.limits import (
     Criterion,
@@ -19,10 +20,11 @@ from orchestrator.studies.validation.limits import (
 )
 from orchestrator.studies.validation.over_limit import OverLimit
 from orchestrator.studies.validation.page import _not_judged
-from orchestrator.studies.validation.questions import QuestionKind
+from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.tables import explanation_table
 from orchestrator.studies.validation.view import parts
 from orchestrator.studies.validation.words import (
+    explanation_cells,
     explanation_sentence,
     open_sentence,
     rating_words,
@@ -84,6 +86,45 @@ def test_a_delay_that_leaves_noise_alone_is_the_cause_and_one_beside_more_is_not
         assert (best.name, best.value) == (f"delay of {name}", pytest.approx(0.03, abs=1e-3))
         said = explanation_sentence(found.result.explanations)
         assert said.startswith(f"The likeliest cause is {name} coming 30 ms later")
+
+
+@pytest.mark.parametrize(
+    ("plant", "reading"),
+    [
+        (-RIGHT.real + 1j * RIGHT.imag, "P counts into the plant"),
+        (RIGHT.conj(), "Q counts into the plant"),
+        (answer(course() - 1, K=3.0), None),
+    ],
+)
+def test_a_wrong_sign_is_told_before_causes_which_are_likely_only_without_it(
+    plant, reading, monkeypatch
+):
+    monkeypatch.setattr("orchestrator.studies.validation.page.sha256_of", str)  # there is no file
+    found = validated(model(**TOLD), recorded(plant), explain=True)
+    said = f"The likeliest explanation is a yes to what is asked of rec1: {reading}? Read so, "
+    for shown in (screen(found), unescape(found.html()).translate({0xA0: " "})):
+        before, asked, after = shown.partition(said)
+        assert bool(asked) == (reading is not None)
+        assert ("The likeliest cause is K = 3" in before) == (reading is None)
+        assert ("If the answer is no, no cause by itself" in after) == (reading is not None)
+    told = found.as_json()
+    assert all(one["behind_question"] == bool(reading) for one in told["explanations"])
+    asked = told["asked_first"]
+    if reading is None:
+        assert asked is None
+        return
+    assert asked["questions"][0]["figures"]["reading"] == reading
+    assert asked["rms_left_pu"] < 0.01 * asked["rms_now_pu"]
+
+
+@pytest.mark.parametrize(("left", "first"), [(1.2, False), (1.4, True)])
+def test_a_question_goes_before_a_cause_that_leaves_clearly_more(left, first):
+    cause = Explanation(CauseKind.VALUE, "pod_p.K", "pu", 200.0, 90.0, 0.1, left * 0.01, noise=1e-4)
+    asked = Question(QuestionKind.READ_OTHERWISE)
+    assert AskedFirst([("rec1", asked)], 1.0, 0.1, 1e-4).goes_before([cause]) == first
+    beside = replace(cause, behind_question=first)
+    assert ("yes" in explanation_cells(beside)) != first
+    assert beside.as_json()["explains"] != first
 
 
 @pytest.mark.parametrize(("more", "explains"), [({}, True), (OVER, False)])
