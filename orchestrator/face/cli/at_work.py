@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Event, Thread
 from time import monotonic
+from typing import TextIO
 
 EVERY = 30.0  # from one line to the next [s]: a log of a night has some hundred
 _MINUTE = 60.0  # [s]
@@ -31,7 +32,7 @@ def tell_instead(teller: object) -> Iterator[None]:
 @contextmanager
 def saying_that_it_is_at_work(command: str | None) -> Iterator[None]:
     """Inside, say every `EVERY` seconds that a command is at work, unless somebody tells more."""
-    if command is None or command in _SERVERS or sys.stdout.isatty():
+    if command is None or command in _SERVERS or not _somebody_reads_lines():
         yield
         return
     ended = Event()
@@ -42,6 +43,13 @@ def saying_that_it_is_at_work(command: str | None) -> Iterator[None]:
     finally:
         ended.set()
         thread.join()
+
+
+def _somebody_reads_lines() -> bool:
+    """Return whether lines on standard error are wanted: a terminal shows a bar; what is closed is None here."""
+    streams: tuple[TextIO | None, TextIO | None] = sys.stdout, sys.stderr
+    shown, told = streams
+    return told is not None and (shown is None or not shown.isatty())
 
 
 def _say_now_and_then(command: str, ended: Event) -> None:

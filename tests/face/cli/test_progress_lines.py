@@ -2,6 +2,7 @@
 
 import json
 import re
+import sys
 import time
 from types import SimpleNamespace
 
@@ -254,6 +255,16 @@ def test_a_command_without_a_count_says_that_it_is_at_work(capsys, monkeypatch):
         with at_work.saying_that_it_is_at_work(command):
             pass
     assert len(started) == 1
+    monkeypatch.setattr(sys, "stderr", None)  # closed: print would say it on standard output
+    with at_work.saying_that_it_is_at_work("modes"):
+        pass
+    assert len(started) == 1
+    monkeypatch.undo()
+    monkeypatch.setattr(at_work, "Thread", thread)
+    monkeypatch.setattr(sys, "stdout", None)
+    with at_work.saying_that_it_is_at_work("modes"):
+        pass
+    assert len(started) == 2
 
 
 def test_a_check_counts_its_questions(monkeypatch):
