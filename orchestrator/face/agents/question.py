@@ -132,7 +132,12 @@ def _ask(words: Sequence[str], allowance: Allowance) -> Any:
         "words": list(words),
     }
     with tempfile.TemporaryDirectory(prefix="gfor-") as own:
-        out, err = _run(task, allowance, Path(own))
+        out, err, code = _run(task, allowance, Path(own))
+    if code < 0:
+        raise NoAnswerError(
+            f"gfor {' '.join(words)} was ended by signal {-code}: the system may have had no memory left for it, or an "
+            "FMU may have died in it"
+        )
     if len(out) > LARGEST_ANSWER:
         raise NoAnswerError(
             f"gfor {' '.join(words)}: the answer has {len(out)} bytes, more than {LARGEST_ANSWER}; ask for less"
@@ -154,8 +159,8 @@ def _refusal(said: str) -> str:
     return f"{text[:half]}\n… {len(text) - MOST_SAID} characters …\n{text[-half:]}"
 
 
-def _run(task: dict[str, Any], allowance: Allowance, temporary: Path) -> tuple[bytes, bytes]:
-    """Run a task in a process of its own; returns what it printed and what it said."""
+def _run(task: dict[str, Any], allowance: Allowance, temporary: Path) -> tuple[bytes, bytes, int]:
+    """Run a task in a process of its own; returns what it printed, what it said, and the code that it ended with."""
     own = {"TMPDIR": str(temporary), "TEMP": str(temporary)}
     own["MPLCONFIGDIR"] = str(cache_directory("pictures").absolute())  # its list of fonts, once
     process = subprocess.Popen(
@@ -170,7 +175,7 @@ def _run(task: dict[str, Any], allowance: Allowance, temporary: Path) -> tuple[b
         start_new_session=True,
     )
     try:
-        return _answered(process, allowance.seconds)
+        return *_answered(process, allowance.seconds), process.returncode
     except subprocess.TimeoutExpired:
         raise NoAnswerError(
             f"gfor {' '.join(task['words'])}: no answer within {allowance.seconds:g} s; {_remedy(task['words'])}"

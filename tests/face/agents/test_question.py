@@ -97,7 +97,7 @@ def here(monkeypatch):
         told = redirect_stdout(out), redirect_stderr(err)
         with chdir(temporary), told[0], told[1], suppress(SystemExit):  # argparse's way out
             main(task["words"])
-        return out.getvalue().encode(), err.getvalue().encode()
+        return out.getvalue().encode(), err.getvalue().encode(), 0
 
     monkeypatch.setattr(question, "_run", run)
 
@@ -134,6 +134,13 @@ def test_a_cache_elsewhere_serves_as_well(tmp_path, monkeypatch):
     monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path / "cache"))
     (weakest, *_) = Verbs(allowance(tmp_path)).scr("wscc9").buses  # of few FMUs
     assert weakest.s_sc_mva > 0
+
+
+def test_a_command_that_a_signal_ends_says_so(tmp_path, monkeypatch):
+    """Not what it said last, such as that it is at work."""
+    monkeypatch.setattr(question, "_run", lambda *given: (b"", b"modes: at work, 30 s", -9))
+    with pytest.raises(NoAnswerError, match=r"gfor modes two_area .* was ended by signal 9"):
+        Verbs(allowance(tmp_path)).modes("two_area")
 
 
 @pytest.mark.parametrize("name", ["a" * 5_000, "a\0b", "-h", "", "../" * 300 + "etc/passwd"])
@@ -200,7 +207,7 @@ def test_a_small_question_is_not_stuck_behind_a_large_one_and_makes_no_folder(
         if not writes:
             both.wait()
         at_work.remove(writes)
-        return b"1", b""
+        return b"1", b"", 0
 
     monkeypatch.setattr(question, "_run", run)
     asked = [["modes"], ["scr"], ["run", "--out", "a"], ["screen", "--out", "b"]]
