@@ -16,7 +16,7 @@ import threading
 import time
 import weakref
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import IO
 
@@ -107,25 +107,26 @@ class _Original:
 
     def copied(self) -> Copy:
         """A copy with this process' environment, folder and standard error, at the head of a session of its own."""
-        line, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        questions, stdin = os.pipe()
-        stdout, answers = os.pipe()
         asked = json.dumps({"env": _environment(), "folder": os.getcwd()}).encode()
-        given = [theirs.fileno(), questions, answers, 2]
-        try:
+        with ExitStack() as theirs, ExitStack() as ours:
+            line, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+            ours.callback(line.close)
+            theirs.callback(other.close)
+            questions, stdin = os.pipe()
+            theirs.callback(os.close, questions)
+            to_it = ours.enter_context(os.fdopen(stdin, "w", encoding="utf-8"))
+            stdout, answers = os.pipe()
+            theirs.callback(os.close, answers)
+            from_it = ours.enter_context(os.fdopen(stdout, encoding="utf-8"))
+            given = [other.fileno(), questions, answers, 2]
             with self._begun:
                 try:
                     socket.send_fds(self._line(), [asked], given)
                 except (BrokenPipeError, ConnectionResetError):  # it was ended
                     self.close()
                     socket.send_fds(self._line(), [asked], given)
-        finally:
-            theirs.close()
-            os.close(questions)
-            os.close(answers)
-        return Copy(
-            line, os.fdopen(stdin, "w", encoding="utf-8"), os.fdopen(stdout, encoding="utf-8")
-        )
+            ours.pop_all()  # they are the copy's from now on
+            return Copy(line, to_it, from_it)
 
     def begin(self) -> None:
         with self._begun:

@@ -1,5 +1,6 @@
 """The server of `gfor explore`: who may ask, and what comes of a process that computes."""
 
+import errno
 import http.client
 import io
 import json
@@ -443,6 +444,25 @@ def test_where_no_process_is_copied_each_does_its_imports(monkeypatch):
     assert "answer" in found.ask("p", {"ask": "open"}, lambda part: None)
     assert isinstance(found._process, subprocess.Popen)
     found.close()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are copied on Linux alone")
+def test_a_copy_that_cannot_be_made_leaves_no_descriptor(monkeypatch):
+    """An environment that is too long for a message, or a folder that is no more."""
+
+    def unsent(*given):
+        raise OSError(errno.EMSGSIZE, "too long")
+
+    original = copies._Original()
+    original.begin()
+    before = len(os.listdir("/proc/self/fd"))
+    monkeypatch.setattr(copies.socket, "send_fds", unsent)
+    for _ in range(3):
+        with pytest.raises(OSError, match="too long"):
+            original.copied()
+    monkeypatch.undo()
+    assert len(os.listdir("/proc/self/fd")) == before
+    original.close()
 
 
 @pytest.mark.parametrize("running", [False, True])
