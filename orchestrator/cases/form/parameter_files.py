@@ -10,6 +10,7 @@ from orchestrator.cases.form.values import TWICE, flatten, given_twice
 from orchestrator.core.errors import CaseError, InputError, Problem
 from orchestrator.core.toml_files import read_toml
 
+COMMENT = "# "  # before what a file says of itself
 _TABLE = "set"
 _EXAMPLE = '[set]\n"gfor.pod_p.K" = 200.0'
 
@@ -61,7 +62,7 @@ def read_parameter_file(path: Path) -> ParameterFile:
 
 
 def parameter_file_text(values: Mapping[str, Value], comments: Sequence[str]) -> str:
-    lines = [f"# {line}".rstrip() for comment in comments for line in comment.splitlines()]
+    lines = [f"{COMMENT}{line}".rstrip() for comment in comments for line in comment.splitlines()]
     lines += [
         "",
         f"[{_TABLE}]",

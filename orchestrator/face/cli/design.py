@@ -25,6 +25,7 @@ from orchestrator.face.cli.case_arguments import (
     case_of,
     values_set,
 )
+from orchestrator.face.cli.former_design import place_of_design
 from orchestrator.face.cli.interrupted import saying_how_it_goes_on
 from orchestrator.face.cli.study import print_study, working_in
 from orchestrator.face.cli.terminal import (
@@ -64,6 +65,7 @@ def run_over_points(options: argparse.Namespace, path: Path) -> int:
         folder,
     ):
         design = compute()
+        path = _place(options, path, met=design.met)
         written = design.save(path, as_typed())
     files = ", ".join(one.name for one in written[1:])
     end = f"Parameter file {path}, beside it {files}; points are kept in {folder}"
@@ -118,6 +120,7 @@ def run(options: argparse.Namespace) -> int:
         design = controller.result
         print_questions([design.prepared], as_json=options.json)
         warn(design.prepared.name, design.warnings)
+        path = _place(options, path, met=design.met)
         controller.save(path, as_typed())
         rmtree(folder, ignore_errors=True)
     ends = exit_code(options, [design.stability]) or (0 if design.met else NOT_MET)
@@ -239,6 +242,11 @@ def _request(options: argparse.Namespace) -> DesignRequest:
         "margins": not options.no_margins,
     }
     return DesignRequest(**asked_of_case(options, DesignRequest, "design") | first | how)
+
+
+def _place(options: argparse.Namespace, path: Path, *, met: bool) -> Path:
+    named = options.out is not None and options.out == path
+    return place_of_design(path, as_typed(), met=met, named=named)
 
 
 def _writable(out: Path | None, usual: str) -> Path:
