@@ -49,6 +49,15 @@ def mode_columns(mode_of: Callable[[Row], Any]) -> list[Column[Row]]:
     ]
 
 
+_ELECTROMECHANICAL = "electromechanical"  # the name of most cases for the swing that they look for
+
+
+def title_of_mode(name: str) -> str:
+    """Return the title of a table on one mode, with the name that the case gives to it."""
+    named = name and name != _ELECTROMECHANICAL
+    return f"Electromechanical mode: {name}" if named else "Electromechanical mode"
+
+
 def named_modes(
     scenarios: Sequence[Content], reference: str | None, *, with_names: bool = False
 ) -> ShownTable:
@@ -75,7 +84,7 @@ def named_modes(
     headings = ["Scenario", "Mode [rad/s]", "f [Hz]", "Damping [%]"]
     headings += [f"{reference}: f [Hz]", "Damping [%]"] if compared else []
     return ShownTable(
-        "Electromechanical modes" if several else "Electromechanical mode",
+        "Electromechanical modes" if several else title_of_mode("".join(names)),
         headings,
         rows,
         parts=[name for name in names for _ in scenarios],

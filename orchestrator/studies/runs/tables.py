@@ -80,17 +80,20 @@ def mode_shapes(
     """Who swings against whom in the modes with a name, and who takes part; where none has one, in the swings with the
     least damping.
 
-    ``with_values``: shows the eigenvalues as well, if no other table does.
+    ``with_values``: shows the eigenvalues as well, if no other table does; else modes with a name have their frequency.
     ``whole``: shows all modes where none has a name; else a line below counts the others."""
     names = list(dict.fromkeys(name for r in results for name in r.named))
     shapes = _of_named(results, names) if names else _of_unnamed(results, whole=whole)
     groups = [shape.mode.swing_groups(shape.result.swing) for shape in shapes]
     across, areas = any(group.between for group in groups), any(r.areas for r in results)
+    with_hertz = bool(names) and not with_values
     columns = ["Scenario" if len(names) == 1 else "Mode"] + ["Mode [rad/s]"] * with_values
+    columns += ["f [Hz]"] * with_hertz
     columns += ["Swing together", "Against"]
     columns += ["In between"] * across + ["Participation by component"] + ["By area"] * areas
     few = partial(first_few, most=_IN_A_CELL if names else _IN_A_CELL_OF_MANY)
-    table = make_table("Mode shapes", *columns, left=len(columns))
+    title = f"Mode shapes: {names[0]}" if len(names) == 1 else "Mode shapes"
+    table = make_table(title, *columns, left=len(columns))
     for shape, group in zip(shapes, groups, strict=True):
         r, mode = shape.result, shape.mode
         together, _ = r.swing_of(mode)
@@ -98,7 +101,8 @@ def mode_shapes(
         sides = [few(together, str), _HARDLY if hardly else few(group.other_side, str)]
         between = [f"{s.partition('.')[0]} {angle:+.0f}°" for s, angle in group.between.items()]
         sides += [few(between, str)] * across
-        row = [shape.label, *[eigenvalue_text(mode.eigenvalue)] * with_values, *sides]
+        row = [shape.label, *[eigenvalue_text(mode.eigenvalue)] * with_values]
+        row += [f"{mode.frequency_hz:.3f}"] * with_hertz + sides
         row.append(few(mode.by_component.items(), share_text))
         row += [few(r.by_area(mode).items(), share_text)] if areas else []
         table.add_row(*row)

@@ -6,7 +6,7 @@ import pytest
 
 import orchestrator as gfor
 from orchestrator.linear.spectra.modes import Mode
-from orchestrator.studies.runs.tables import mode_shapes
+from orchestrator.studies.runs.tables import mode_shapes, named_modes
 
 SWINGS, CONTROLS = 20, 15
 
@@ -73,3 +73,16 @@ def test_of_a_mode_with_a_name_nothing_else_is_counted(unnamed):
     table = mode_shapes([replace(unnamed, named={"Local mode": named})])
     assert table.row_count == 1
     assert table.caption is None
+
+
+def test_a_shape_tells_its_modes_name_and_frequency(unnamed):
+    """The block stood below a table of other modes, and told neither."""
+    named = replace(unnamed, named={"inter-area": unnamed.modes[-1]})
+    table = mode_shapes([named])
+    assert str(table.title) == "Mode shapes: inter-area"
+    (column,) = [column for column in table.columns if str(column.header) == "f [Hz]"]
+    assert [str(cell) for cell in column.cells] == ["1.000"]
+    assert "f [Hz]" not in [str(c.header) for c in mode_shapes([named], with_values=True).columns]
+    assert named_modes([named], None).title == "Electromechanical mode: inter-area"
+    usual = replace(unnamed, named={"electromechanical": unnamed.modes[-1]})
+    assert named_modes([usual], None).title == "Electromechanical mode"
