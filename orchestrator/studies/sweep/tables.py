@@ -8,24 +8,37 @@ from orchestrator.output.report.terminal_tables import make_table
 from orchestrator.studies.sweep.dataset import Samples, warned
 from orchestrator.studies.sweep.limit import Ending
 from orchestrator.studies.sweep.plots import axis_label
-from orchestrator.studies.sweep.trajectories import GridPlace
-from orchestrator.studies.sweep.verdicts import place_text, value_text, verdicts
+from orchestrator.studies.sweep.sweep import ScenarioSweep
+from orchestrator.studies.sweep.trajectories import GridPlace, Trajectory
+from orchestrator.studies.sweep.verdicts import least_damped, place_text, value_text, verdicts
 
 _FAILURES_SHOWN = 5  # points that could not be computed
+
+
+def _with_least_damping(samples: Samples, sweep: ScenarioSweep) -> Trajectory | None:
+    """Return the trajectory on which the least damped mode of the verdict is."""
+    found = least_damped(sweep, samples.axes)
+    if found is None:
+        return None
+    place, _, mode = found
+    there = (t for t in sweep.trajectories if place in t.points)
+    return next((t for t in there if t.points[place].mode == mode), None)
 
 
 def trajectories(samples: Samples) -> Table:
     """The ends of each trajectory, its least and its most damping, and its least similarity from point to point.
 
-    The table shows the trajectories with a name, or all trajectories if the case names no mode."""
+    The table shows the trajectories with a name and that of the least damping, or all if the case names no mode."""
     title = f"Each mode over {', '.join(axis_label(axis) for axis in samples.axes)}"
     figures = ("f [Hz]", "Damping [%]", "Least [%]", "Most [%]", "Points", "Alike")
     table = make_table(title, "Mode", *figures)
     anything = any(t.case_name for s in samples.result.scenarios for t in s.trajectories)
     for sweep in samples.result.scenarios:
+        least_of_all = _with_least_damping(samples, sweep)
         for trajectory in sweep.trajectories:
             curve = samples.of(sweep, trajectory)
-            if not curve or (anything and trajectory.case_name is None):
+            unnamed = anything and trajectory.case_name is None
+            if not curve or (unnamed and trajectory is not least_of_all):
                 continue
             (_, first), (_, last) = curve[0], curve[-1]
             where, least = min(curve, key=lambda entry: float(entry[1]["damping"]))
@@ -36,7 +49,7 @@ def trajectories(samples: Samples) -> Table:
             if named not in (0, len(curve)):
                 points += f", named at {named}"
             cells = (
-                f"{sweep.prepared.title}: {trajectory.name}",
+                f"{sweep.prepared.title}: {trajectory.name}{', damped least' if unnamed else ''}",
                 f"{first['frequency']:.3f} → {last['frequency']:.3f}",
                 f"{first['damping']:.2f} → {last['damping']:.2f}",
                 f"{least['damping']:.2f} at {_values(samples, where)}",

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from orchestrator.linear.spectra.mode_tracking import ModeSet
 from orchestrator.linear.spectra.modes import damping_percent, mode_in_words
 from orchestrator.output.report.verdict_sentence import VerdictSentence
 from orchestrator.studies.sweep.axes import Axis, grid_places
@@ -43,8 +44,10 @@ def _verdict(sweep: ScenarioSweep, axes: Sequence[Axis]) -> VerdictSentence:
     return VerdictSentence(True, "stable", f"nothing grows at any of {total} points{least}")
 
 
-def _least(sweep: ScenarioSweep, axes: Sequence[Axis]) -> str:
-    """The least damped mode of the range at all places of the grid, and where that is; "" without modes."""
+def least_damped(
+    sweep: ScenarioSweep, axes: Sequence[Axis]
+) -> tuple[GridPlace, ModeSet, int] | None:
+    """Return the place of the grid with the least damping of the range, its modes, and which; None without modes."""
     modes_at = {place: sweep.points[place].modes for place in grid_places(axes)}
     found = [
         (place, modes, k)
@@ -52,11 +55,19 @@ def _least(sweep: ScenarioSweep, axes: Sequence[Axis]) -> str:
         if modes is not None
         for k in range(len(modes.eigenvalues))
     ]
-    if not found:
-        return ""
-    place, modes, k = min(
-        found, key=lambda one: damping_percent(complex(one[1].eigenvalues[one[2]]))
+    return min(
+        found,
+        key=lambda one: damping_percent(complex(one[1].eigenvalues[one[2]])),
+        default=None,
     )
+
+
+def _least(sweep: ScenarioSweep, axes: Sequence[Axis]) -> str:
+    """The least damped mode of the range at all places of the grid, and where that is; "" without modes."""
+    found = least_damped(sweep, axes)
+    if found is None:
+        return ""
+    place, modes, k = found
     shares: dict[str, float] = {}
     for name, factor in zip(modes.names, modes.participation()[k], strict=True):
         component = name.partition(".")[0]

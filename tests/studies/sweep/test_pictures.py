@@ -145,10 +145,13 @@ def test_a_trajectory_is_told_by_its_ends_and_where_it_is_damped_least_and_most(
         {"frequency": f, "damping": d, "similarity": s, "named": d < 8}
         for f, d, s in ((0.5, 5.0, 1.0), (0.6, 2.5, 0.97), (0.65, 9.0, 0.8), (0.7, 7.0, 0.9))
     ]
-    sweep = SimpleNamespace(
-        trajectories=[SimpleNamespace(name="tie", case_name="tie")],
-        prepared=bare_scenario(title="SG + GFOR"),
-    )
+    trajectories = [
+        SimpleNamespace(name="tie", case_name="tie", points={}),
+        SimpleNamespace(name="mode 2", case_name=None, points={(0,): SimpleNamespace(mode=1)}),
+        SimpleNamespace(name="mode 3", case_name=None, points={(0,): SimpleNamespace(mode=0)}),
+    ]
+    monkeypatch.setattr(tables, "least_damped", lambda *_: ((0,), None, 0))
+    sweep = SimpleNamespace(trajectories=trajectories, prepared=bare_scenario(title="SG + GFOR"))
     samples = SimpleNamespace(
         result=SimpleNamespace(scenarios=[sweep]),
         axes=["X_L"],
@@ -157,13 +160,13 @@ def test_a_trajectory_is_told_by_its_ends_and_where_it_is_damped_least_and_most(
     )
     table = tables.trajectories(samples)
     assert [[str(cell) for cell in column.cells] for column in table.columns] == [
-        ["SG + GFOR: tie"],
-        ["0.500 → 0.700"],
-        ["5.00 → 7.00"],
-        ["2.50 at 0.2"],
-        ["9.00 at 0.3"],
-        ["4, named at 3"],
-        ["0.80"],
+        ["SG + GFOR: tie", "SG + GFOR: mode 3, damped least"],
+        ["0.500 → 0.700"] * 2,
+        ["5.00 → 7.00"] * 2,
+        ["2.50 at 0.2"] * 2,
+        ["9.00 at 0.3"] * 2,
+        ["4, named at 3"] * 2,
+        ["0.80"] * 2,
     ]
 
 
