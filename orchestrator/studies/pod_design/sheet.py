@@ -257,6 +257,12 @@ def _of_the_modes(d: PodDesign) -> Iterable[str]:
             f"{eigenvalue_text(d.final.eigenvalue)} rad/s with {percent(d.final.damping_ratio)}, the one that the case "
             f"now calls {d.mode_name} has {percent(d.after.other_named.damping_ratio)}, and the lesser counts"
         )
+    least = d.before.worst
+    if least is not None and least.damping_ratio < damping_ratio(d.initial):
+        yield (
+            f"the target, {d.mode_name}, is not the least damped mode, which has {percent(least.damping_ratio)} at "
+            f"{least.frequency_hz:.3f} Hz without the controller"
+        )
     if d.broken:
         yield f"but {d.broken}"
     elif d.met and (other := d.worst_other) and other.damping_ratio < d.required_damping:

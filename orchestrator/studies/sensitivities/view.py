@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.core.late import pd
+from orchestrator.core.options import Option
 from orchestrator.core.safe_files import made_folder
 from orchestrator.linear.spectra.modes import mode_in_words
 from orchestrator.output.report.column_table import Column, ColumnTable
@@ -107,6 +108,16 @@ def name_of(result: SensitivityResult) -> str:
     return f"{name}, {told}" if name else told
 
 
+def _less_damped(result: SensitivityResult) -> str:
+    """Tell which mode is damped less than the one that is shown, with what takes it; "" where none is."""
+    swings = [mode for mode in result.modes.modes if mode.is_oscillation]
+    least = min(swings, key=lambda mode: mode.damping_percent, default=result.mode)
+    if least.damping_percent >= result.mode.damping_percent:
+        return ""
+    told = f"{least.frequency_hz:.3f} Hz, {least.damping_percent:.2f} %"
+    return f", not the least damped, which is {told} ({Option.MODE} critical)"
+
+
 def tell_most(result: SensitivityResult) -> str:
     """Tell what moves the damping most, and how the rows are ordered."""
     return (
@@ -130,8 +141,9 @@ def sensitivity_table(result: SensitivityResult) -> ColumnTable[Sensitivity]:
         "is held" if result.held else "moves with the value, which the figures include, or stays"
     )
     notes = _notes(result.rows)
+    shown = f"{result.modes.prepared.title}, {name_of(result)}{_less_damped(result)}"
     title = (
-        f"{result.modes.prepared.title}, {name_of(result)}: how it changes for one unit and for 1 % more of each "
+        f"{shown}: how it changes for one unit and for 1 % more of each "
         f"value. A point is one percent of damping, as from 5 % to 6 %. The operating point {point}"
     )
     return ColumnTable(

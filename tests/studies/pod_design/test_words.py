@@ -25,6 +25,8 @@ def test_a_mode_below_what_is_asked_is_told_with_met(other, met, broken, said):
     design = SimpleNamespace(
         achieved_damping=0.1044,
         required_damping=0.1,
+        initial=-0.1 + 4j,
+        before=SimpleNamespace(worst=None),
         after=SimpleNamespace(other_named=None),
         broken=broken,
         met=met,
@@ -45,6 +47,8 @@ def test_a_requirement_that_is_missed_names_the_keyword_to_python_and_the_option
     design = SimpleNamespace(
         achieved_damping=0.05,
         required_damping=0.1,
+        initial=-0.1 + 4j,
+        before=SimpleNamespace(worst=None),
         after=SimpleNamespace(other_named=None),
         broken=None,
         met=False,
@@ -58,3 +62,29 @@ def test_a_requirement_that_is_missed_names_the_keyword_to_python_and_the_option
     assert said.endswith("; use --refine")
     assert parts_of(said)[-1] == Option.REFINE
     assert Option.REFINE.python == "refine"
+
+
+@pytest.mark.parametrize(("damping", "told"), [(0.0728, True), (0.2, False)])
+def test_a_target_that_is_not_the_least_damped_mode_is_told(damping, told):
+    least = SimpleNamespace(damping_ratio=damping, frequency_hz=1.234)
+    design = SimpleNamespace(
+        achieved_damping=0.3,
+        required_damping=0.2,
+        mode_name="inter-area",
+        initial=-0.5756 + 4.5373j,
+        before=SimpleNamespace(worst=least),
+        after=SimpleNamespace(other_named=None),
+        broken=None,
+        met=True,
+        worst_other=None,
+        damping_met=True,
+        spoilt=None,
+        thin_margin=None,
+        refinement=None,
+        gain_is_swept=False,
+        final=None,
+        designed=None,
+        active_bound=None,
+    )
+    words = "the target, inter-area, is not the least damped mode, which has 7.28 % at 1.234 Hz without the controller"
+    assert (words in verdict(design)) is told

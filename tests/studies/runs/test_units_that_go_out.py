@@ -61,7 +61,7 @@ def test_of_a_sensitivity():
         damping_percent=EIGENVALUE_JSON["damping_percent"],
         by_component={"gfor": 1.0},
     )
-    modes = SimpleNamespace(name_of=lambda _: "", prepared=bare_scenario())
+    modes = SimpleNamespace(name_of=lambda _: "", prepared=bare_scenario(), modes=[])
     (said,) = rows_of(SimpleNamespace(rows=[row], mode=mode, modes=modes, held=()))
     # a difference quotient of the damping ratio [%], beside the derivative of the product
     step = 1e-6

@@ -350,10 +350,17 @@ def test_a_remark_of_several_rows_stands_once_below_a_table_in_parts():
         row_of("c", None, "no steady state"),
     )
     mode = Mode(-1 + 8j, (("sg1.omega", 0.6), ("sg2.omega", 0.3)), {})
-    modes = SimpleNamespace(prepared=SimpleNamespace(title="Base"), name_of=lambda mode: "slow")
+    modes = SimpleNamespace(
+        prepared=SimpleNamespace(title="Base"), name_of=lambda mode: "slow", modes=[mode]
+    )
     found = SimpleNamespace(rows=rows, mode=mode, modes=modes, held=False)
     table = sensitivity_table(found)
     assert table.title.startswith("Base, slow, 1.273 Hz, 12.40 % (sg1 0.60, sg2 0.30): ")
+    modes.modes = [mode, Mode(-0.5 + 9j, (), {}), Mode(-0.7 + 9j, (), {}), Mode(-0.01 + 0j, (), {})]
+    less = (
+        "(sg1 0.60, sg2 0.30), not the least damped, which is 1.432 Hz, 5.55 % (--mode critical): "
+    )
+    assert less in sensitivity_table(found).title
     remark = table.columns[-1]
     assert [remark.cell(row) for row in rows] == ["", "note 1", "note 1", "no steady state"]
     assert table.note == "Note 1: POD-Q is off."
