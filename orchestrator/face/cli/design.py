@@ -13,6 +13,7 @@ from rich.markup import escape
 from orchestrator.cases.form.schema import Value
 from orchestrator.cases.questions.idle_values import DAMPING_CONTROLLERS
 from orchestrator.core.errors import NOT_MET, CosimError, InputError
+from orchestrator.core.options import Option
 from orchestrator.face.cli.arguments import (
     add_executor_arguments,
     add_options,
@@ -45,6 +46,7 @@ from orchestrator.studies.coordinated_design.one_point import design_controller
 from orchestrator.studies.coordinated_design.study import ALL, PointsDesignRequest
 from orchestrator.studies.pod_design.design import DesignRequest
 from orchestrator.studies.pod_design.sheet import first_screen, sheet
+from orchestrator.studies.pod_design.target import example_of
 from orchestrator.studies.pod_design.view import (
     ControllerDesign,
     parameter_file_path,
@@ -78,7 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--controller",
         action="append",
-        required=True,
+        default=[],
         choices=DAMPING_CONTROLLERS,
         help="the controller to design (with --points repeatable)",
     )
@@ -99,6 +101,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    if not options.controller:
+        raise InputError(_no_controller(options))
     if options.points is not None:
         _check_over_points(options)
         controllers = "_".join(dict.fromkeys(options.controller))
@@ -152,6 +156,15 @@ def run(options: argparse.Namespace) -> int:
         highlight=False,
     )
     return ends
+
+
+def _no_controller(options: argparse.Namespace) -> str:
+    example = example_of(case_of(options))
+    if not example:
+        names = " or ".join(DAMPING_CONTROLLERS)
+        return f"no controller is given, and no component of the case has one of {names}"
+    command = f"gfor design {shlex.quote(options.case)} {example}"
+    return f"no controller is given; give {Option.CONTROLLER}, such as {command}"
 
 
 def _command_with_less_gain(options: argparse.Namespace, controller: ControllerDesign) -> str:

@@ -198,6 +198,25 @@ def find_scenario(
     return fitting[0]
 
 
+def example_of(case: Case) -> str:
+    """Return the words of a design that this case can have; "" where it has nobody to design for."""
+    for controller in DAMPING_CONTROLLERS:
+        fitting = [
+            name
+            for name in case.scenarios
+            if with_controller(case.components_of(name, {}, []), controller)
+        ]
+        if not fitting:
+            continue
+        words = f"{Option.CONTROLLER} {controller}"
+        try:
+            find_scenario(case, controller, scenario=None, overrides={}, parameters=[])
+        except InputError:
+            return f"{words} {Option.SCENARIO} {fitting[0]}"
+        return words
+    return ""
+
+
 def _lacking(plan: Mapping[str, ComponentPlan], controller: str) -> str:
     """Name the variables that the first component with some of a controller's lacks; "" if there is none."""
     for name, component in plan.items():

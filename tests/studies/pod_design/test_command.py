@@ -197,7 +197,10 @@ def test_no_stages_leave_the_lead_lag_out(design):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ([], "the following arguments are required: --controller"),
+        (
+            [],
+            "no controller is given; give --controller, such as gfor design two_area --controller pod_p",
+        ),
         (["--controller", "pod_x"], "invalid choice: 'pod_x'"),
         (["--scenario", "base"], "scenario 'base': no component has the controller pod_p"),
         (
