@@ -16,7 +16,23 @@ _SERVERS = ("explore", "mcp")
 """Commands that wait for questions, and end when they are told to."""
 
 _telling: list[object] = []
-"""What tells how far the command is, and so more than that it is at work."""
+"""Tellers of how far the command is, which tell more than that it is at work."""
+
+_told: list[float] = []
+"""Times at which the command under way began and told a line [s]; empty where none is under way."""
+
+LOOK = 1.0  # least wait for a line: until then somebody who begins has something to tell [s]
+
+
+def silence() -> float:
+    """Return for how long the command has told no line [s]; 0 outside of commands."""
+    return monotonic() - _told[-1] if _told else 0.0
+
+
+def end_silence() -> None:
+    """Note that a line is told now."""
+    if _told:
+        _told[:] = [monotonic()]
 
 
 @contextmanager
@@ -32,17 +48,22 @@ def tell_instead(teller: object) -> Iterator[None]:
 @contextmanager
 def saying_that_it_is_at_work(command: str | None) -> Iterator[None]:
     """Inside, say every `EVERY` seconds that a command is at work, unless somebody tells more."""
-    if command is None or command in _SERVERS or not _somebody_reads_lines():
+    if command is None or command in _SERVERS:
         yield
         return
+    _told[:] = [monotonic()]
     ended = Event()
     thread = Thread(target=_say_now_and_then, args=(command, ended), daemon=True)
-    thread.start()
+    shown = _somebody_reads_lines()
+    if shown:
+        thread.start()
     try:
         yield
     finally:
         ended.set()
-        thread.join()
+        if shown:
+            thread.join()
+        _told.clear()
 
 
 def _somebody_reads_lines() -> bool:
@@ -54,8 +75,9 @@ def _somebody_reads_lines() -> bool:
 
 def _say_now_and_then(command: str, ended: Event) -> None:
     began = monotonic()
-    while not ended.wait(EVERY):
+    while not ended.wait(max(LOOK, EVERY - silence())):
         if not _telling:
+            end_silence()
             print(
                 f"{command}: at work, {in_words(monotonic() - began)}", file=sys.stderr, flush=True
             )

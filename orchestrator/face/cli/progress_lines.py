@@ -9,13 +9,13 @@ from typing import Self
 
 from rich.console import Console
 
-from orchestrator.face.cli.at_work import EVERY, in_words, tell_instead
+from orchestrator.face.cli.at_work import EVERY, LOOK, end_silence, in_words, silence, tell_instead
 from orchestrator.face.cli.terminal import make_errors
 from orchestrator.studies.points.under_way import doing, parts_done
 
 
 class ProgressLines:
-    """Says every `EVERY` seconds how far a command is; a short one says nothing.
+    """Says every `EVERY` seconds of a command how far it is; a short one says nothing.
 
     ``name``: of what is computed; ``counted``: what is counted, in words."""
 
@@ -73,7 +73,11 @@ class ProgressLines:
         return f"{text}, about {in_words(left)} left"
 
     def _say_now_and_then(self) -> None:
-        while not self._ended.wait(EVERY):
+        # of several stages that are shorter than `EVERY` each, a line comes in its time all the same
+        wait = max(EVERY - silence(), min(EVERY, LOOK))
+        while not self._ended.wait(wait):
+            wait = EVERY
+            end_silence()
             make_errors().print(self.line(), markup=False)
 
 

@@ -59,8 +59,9 @@ def _compute(
 ) -> int:
     request, found = SensitivitiesRequest(**asked_by(options, SensitivitiesRequest)), []
     for scenario in scenarios:
+        name = f"sensitivities of {scenario.name}" if len(scenarios) > 1 else "sensitivities"
         with (
-            progress_lines(make_console(), "sensitivities", "parameters") as lines,
+            progress_lines(make_console(), name, "parameters") as lines,
             shown_progress("Parameters", shown=not options.json) as report,
         ):
             told = replace(request, report=both(lines.report, report))

@@ -280,3 +280,35 @@ def test_a_check_counts_its_questions(monkeypatch):
     with pytest.raises(InputError, match="enough"):
         acceptance.check("a.fmu", report=lambda *count: counts.append(count))
     assert counts == [(3, 25)]
+
+
+def test_stages_that_are_each_too_short_for_a_line_have_one_together(capsys, monkeypatch):
+    """Sensitivities of four scenarios said nothing for 60 s: each was over before its first line."""
+    now, waits = [100.0], []
+    monkeypatch.setattr(at_work, "monotonic", lambda: now[0])
+
+    def said_in(seconds):
+        """Lines of a stage that lasts for so long."""
+        end = now[0] + seconds
+
+        def wait(step):
+            waits.append(step)
+            if now[0] + step >= end:
+                now[0] = end
+                return True
+            now[0] += step
+            return False
+
+        lines = ProgressLines("sweep", "points", shown=False)
+        lines.report(1, 4)
+        lines._ended = SimpleNamespace(wait=wait)
+        lines._say_now_and_then()
+        return len(lines_of(capsys.readouterr().err, "sweep"))
+
+    monkeypatch.setattr(at_work, "Thread", lambda **_: SimpleNamespace(start=int, join=int))
+    with at_work.saying_that_it_is_at_work("sweep"):
+        assert [said_in(17) for _ in range(4)] == [0, 1, 0, 1]
+        assert at_work.silence() == pytest.approx(8.0)
+    assert at_work.silence() == 0.0
+    assert min(waits) >= at_work.LOOK
+    assert [said_in(17) for _ in range(2)] == [0, 0]  # of Python, where no command is under way
