@@ -63,6 +63,17 @@ _WITHOUT_VALUES = {*CauseKind} - {CauseKind.VALUE, CauseKind.POSITION, CauseKind
 
 
 @dataclass(frozen=True)
+class Bound:
+    """A value from which on all others leave as little of an error, so that the recordings tell no single one.
+
+    ``is_least``: whether these are above it; ``is_reached``: whether the answer changes beyond it at all."""
+
+    value: float
+    is_least: bool
+    is_reached: bool
+
+
+@dataclass(frozen=True)
 class Explanation:
     """One cause by itself, and the error that it leaves: rms of P and Q together [pu of the rating].
 
@@ -82,6 +93,7 @@ class Explanation:
     stands_in: bool = (
         False  # whether it may only stand for a limit of the current that the model lacks
     )
+    bound: Bound | None = None  # of a number with no single value that explains the error
     behind_question: bool = False  # whether a yes to what is asked leaves clearly less
 
     @property
@@ -130,8 +142,12 @@ class Explanation:
     @property
     def takes_second(self) -> bool:
         """Return whether another cause is looked for beside it, if it leaves much: of one number, or of a switch."""
-        alone = self.cause is CauseKind.VALUE and not self.beside
-        return alone or self.cause is CauseKind.POSITION
+        return self.is_number_alone or self.cause is CauseKind.POSITION
+
+    @property
+    def is_number_alone(self) -> bool:
+        """Return whether it is another value of one number, and nothing beside it."""
+        return self.cause is CauseKind.VALUE and not self.beside
 
     def same_as(self, other: Explanation) -> bool:
         """Return whether another cause, found on another way, is of the same parameters.
@@ -164,6 +180,7 @@ class Explanation:
             "unit": self.unit,
             "now": self.now,
             "value": self.value,
+            **self._bound_json(),
             "with": dict(self.beside),
             "with_now": dict(self.beside_now),
             "rms_now_pu": self.error,
@@ -175,6 +192,13 @@ class Explanation:
             "noise_pu": self.noise,
             "hardly_beyond_noise": self.hardly_beyond,
         }
+
+    def _bound_json(self) -> dict[str, Any]:
+        """The bound of its value; nulls where the value itself is told."""
+        if self.bound is None:
+            return {"at_least": None, "at_most": None, "bound_is_reached": None}
+        told, other = ("at_least", "at_most") if self.bound.is_least else ("at_most", "at_least")
+        return {told: self.bound.value, other: None, "bound_is_reached": self.bound.is_reached}
 
 
 @dataclass(frozen=True)

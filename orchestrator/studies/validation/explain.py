@@ -18,6 +18,7 @@ from orchestrator.studies.validation.cause_bench import (
     other_positions,
     squares_of,
 )
+from orchestrator.studies.validation.cause_bounds import with_bound
 from orchestrator.studies.validation.cause_limits import levels_of_limits, limits_of_current
 from orchestrator.studies.validation.cause_numbers import (
     Promise,
@@ -76,11 +77,31 @@ def explain_errors(
         return found
     enough = found.explains and found.causes[0].left <= _MUCH * _movement(events)
     if enough or not found.finished or not _misses_much(device, events):
-        return found
+        return _with_bounds(device, in_step or events, found, report)
     short = [cut_event(one, _HELD_AFTER, _HELD_BEFORE) for one in events]
     other = _search(device.in_step, short, report, _plain_error(device, short))
-    taken = other if other.explains and _leaves_less(other, found) else found
-    return replace(taken, finished=other.finished)
+    if not (other.explains and _leaves_less(other, found)):
+        taken = replace(found, finished=other.finished)
+        return _with_bounds(device, in_step or events, taken, report)
+    return _with_bounds(device.in_step, short, other, report)
+
+
+def _with_bounds(
+    device: PlayedDevice, events: Sequence[RecordedEvent], found: CauseSearch, report: Report
+) -> CauseSearch:
+    """The causes, each likely number with the bound of its values where the recordings tell no single one."""
+    numbers = [one for one in found.causes if one.explains and one.is_number_alone]
+    if not found.finished or not numbers:
+        return found
+    bounded: dict[str, Explanation] = {}
+    try:
+        bench = CauseBench(device, _looked_at(device, events), report)
+        for one in numbers:
+            bounded[one.name] = with_bound(bench, one)
+    except KeyboardInterrupt:
+        found = replace(found, finished=False)
+    causes = [bounded.get(one.name, one) if one in numbers else one for one in found.causes]
+    return replace(found, causes=causes)
 
 
 def _movement(events: Sequence[RecordedEvent]) -> float:

@@ -10,7 +10,12 @@ from orchestrator.core.units import whole_percent
 from orchestrator.linear.signals.identification import IdentifiedMode
 from orchestrator.studies.validation.asked_first import AskedFirst
 from orchestrator.studies.validation.beside import WindowApart
-from orchestrator.studies.validation.causes import CauseKind, Explanation, nothing_to_explain
+from orchestrator.studies.validation.causes import (
+    Bound,
+    CauseKind,
+    Explanation,
+    nothing_to_explain,
+)
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import EventComparison, JumpDoubt
 from orchestrator.studies.validation.fit import Fit, FittedParameter, Untold
@@ -448,6 +453,11 @@ def value_text(value: float | bool | None) -> str:
     return str(value).lower() if isinstance(value, bool) else f"{value:.4g}"
 
 
+def bound_text(bound: Bound) -> str:
+    """Write a bound with two digits."""
+    return f"at {'least' if bound.is_least else 'most'} {float(f'{bound.value:.2g}'):g}"
+
+
 def explanation_cells(one: Explanation) -> tuple[str, ...]:
     """Cells of a table's row: the cause, its values, the error left and the part that it explains."""
     unit = f" [{one.unit}]" if one.unit not in ("", "1") else ""
@@ -455,7 +465,7 @@ def explanation_cells(one: Explanation) -> tuple[str, ...]:
     return (
         f"{one.name}{unit}",
         value_text(one.now),
-        f"{value_text(one.value)}{beside}",
+        f"{value_text(one.value) if one.bound is None else bound_text(one.bound)}{beside}",
         f"{one.left:.4g} of {one.error:.4g}",
         whole_percent(one.share),
         _likely(one),
@@ -650,8 +660,18 @@ def _cause(one: Explanation) -> str:
             ]
             first = f"{one.name} = {value_text(one.value)}{unit} (now {value_text(one.now)})"
             return first + "".join(others)
+        case _ if one.bound is not None:
+            of = f"{one.name} of {bound_text(one.bound)}{unit} (now {value_text(one.now)})"
+            return f"{of}, {_beyond(one.bound)}"
         case _:
             return f"{one.name} = {value_text(one.value)}{unit}{beside} (now {value_text(one.now)})"
+
+
+def _beyond(bound: Bound) -> str:
+    """Say why no single value is told."""
+    if not bound.is_reached:
+        return "which the recording does not reach"
+    return f"of which the recording tells no {'larger' if bound.is_least else 'smaller'} one apart"
 
 
 _NAMED = 2  # trials that did not run, in the sentence that counts them
