@@ -16,7 +16,9 @@ from orchestrator.studies.validation.figures import SIGNALS, signals_of
 from orchestrator.studies.validation.hidden import jumps_of
 from orchestrator.studies.validation.questions import Question, QuestionKind
 
-_LONG = 0.005  # interval between samples [s], from which on the moment of a jump matters
+_LONG = 0.005 * (1 - 1e-6)
+"""Interval between samples [s], from which on the moment of a jump matters: times of a file make 4.9999999 ms of 5."""
+
 _SHORT = 0.0005  # the same, from which on it matters to fluxes and filters: a fortieth of a period
 _LONG_STEP = 2e-4  # communication step [s] above which a jump is seen late by what matters
 # of another step its part of the device's own, how many times what changes with it is the doubt, and how that is named
