@@ -101,9 +101,12 @@ class Warm:
         return Ran(line, outputs, self.address)
 
     def use_one_core(self) -> None:
-        """Let the commands find one core where there are several: a study then has no processes of its own."""
+        """Let the commands find one core where there are several: a study then has no processes of its own.
+
+        Those of other workers of pytest find another one."""
         if hasattr(os, "sched_setaffinity"):
-            os.sched_setaffinity(self._parent.pid, {max(os.sched_getaffinity(0))})
+            cores = sorted(os.sched_getaffinity(0))
+            os.sched_setaffinity(self._parent.pid, {cores[self._parent.pid % len(cores)]})
 
     def close(self) -> None:
         assert self._parent.stdin is not None

@@ -6,9 +6,8 @@ from pathlib import Path
 from orchestrator.cases.form.parameter_files import COMMENT
 from orchestrator.core.foreign_files import one_line, read_text
 from orchestrator.face.cli.terminal import say
+from orchestrator.studies.pod_design.view import COMMAND, OUTCOME
 
-_COMMAND = "command: "  # begins the line of the command that made a file
-_OUTCOME = "with it: "  # begins the line of the mode that a design gives
 _NOT_MET = "_not_met"  # ends the name of a file whose design leaves another one in its place
 
 
@@ -32,12 +31,12 @@ def former_design(path: Path, command: str) -> FormerDesign | None:
         return None
     lines = read_text(path, errors="replace").splitlines()
     comments = [one_line(line.removeprefix(COMMENT)) for line in lines if line.startswith(COMMENT)]
-    rows = [row for row, text in enumerate(comments) if text.startswith(_COMMAND)]
+    rows = [row for row, text in enumerate(comments) if text.startswith(COMMAND)]
     if not rows:
         return FormerDesign("", "")
-    made, said = comments[rows[0]].removeprefix(_COMMAND), comments[rows[0] + 1 :]
+    made, said = comments[rows[0]].removeprefix(COMMAND), comments[rows[0] + 1 :]
     # a design for one operating point tells its mode first, one over points its verdict
-    outcome = next((text for text in said if text.startswith(_OUTCOME)), "".join(said[:1]))
+    outcome = next((text for text in said if text.startswith(OUTCOME)), "".join(said[:1]))
     return None if made == command else FormerDesign(made, outcome)
 
 

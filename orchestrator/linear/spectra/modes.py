@@ -124,7 +124,7 @@ class Mode(OfEigenvalue):
     @cached_property
     def by_component(self) -> dict[str, float]:
         """Participation of every component as a whole: the sum over its states, largest first."""
-        return self.by_group(lambda state: state.partition(".")[0])
+        return shares_of_components(self.participation)
 
     def by_group(self, group_of: Callable[[str], str | None]) -> dict[str, float]:
         """Participation of groups of states, largest first; states whose group is None are left out."""
@@ -190,6 +190,11 @@ _FAINTEST = 0.01
 _ALIKE_DEG = 45.0
 """Two states swing together, or against each other, if their angle is within this of 0 or of 180 degrees: then the
 greater part of each motion is along that of the other one."""
+
+
+def shares_of_components(factors: Iterable[tuple[str, float]]) -> dict[str, float]:
+    """Return the participation of every component, the sum over its states, largest first."""
+    return _sum_by_group(factors, lambda state: state.partition(".")[0])
 
 
 def _sum_by_group(

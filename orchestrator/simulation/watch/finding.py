@@ -72,6 +72,11 @@ def go_on_to(time: float) -> str:
     return f"let the run go on to t = {time:.12g} s"
 
 
+def remedy_of(enough: float | None) -> str:
+    """Say what shows what a stretch is too short for: a longer run [s], or with None a later next event."""
+    return "give the events more distance" if enough is None else go_on_to(enough)
+
+
 @dataclass(frozen=True, slots=True)
 class Finding:
     kind: Kind

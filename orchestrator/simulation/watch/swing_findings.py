@@ -13,7 +13,7 @@ from orchestrator.simulation.watch.confirmation import (
     rises,
     rms,
 )
-from orchestrator.simulation.watch.finding import NOT_JUDGED, Finding, Kind, go_on_to, rounded_up
+from orchestrator.simulation.watch.finding import NOT_JUDGED, Finding, Kind, remedy_of, rounded_up
 from orchestrator.simulation.watch.oscillation import Oscillation, too_fast
 from orchestrator.simulation.watch.seen import shown_name
 from orchestrator.simulation.watch.stretches import Stretch
@@ -70,7 +70,7 @@ def doubtful_swing(swing: Swing, oscillation: Oscillation, why: str, stretch: St
     message = (
         f"whether the response to t = {stretch.begin:.4g} s settles is not judged: {shown_name(swing.name)} swings at "
         f"{oscillation.frequency_hz:.4g} Hz and seems to {seems} ({oscillation.rate:+.3g} 1/s until {_end(stretch)}), "
-        f"but {why}; {_remedy(enough)}"
+        f"but {why}; {remedy_of(enough)}"
     )
     finding = _finding(NOT_JUDGED, stretch.begin, swing, message, oscillation, stretch)
     return replace(finding, enough=enough)
@@ -79,10 +79,6 @@ def doubtful_swing(swing: Swing, oscillation: Oscillation, why: str, stretch: St
 def _enough(swing: Swing, oscillation: Oscillation | None, stretch: Stretch) -> float | None:
     """Stop of a run that shows the swing for long enough [s]; None where an event ends it."""
     return rounded_up(needed_end(swing, oscillation)) if stretch.last else None
-
-
-def _remedy(enough: float | None) -> str:
-    return "give the events more distance" if enough is None else go_on_to(enough)
 
 
 def irregular_swing(swing: Swing, unit: str, stretch: Stretch) -> Finding:
@@ -106,7 +102,7 @@ def doubtful_irregular_swing(swing: Swing, why: str, unit: str, stretch: Stretch
     message = (
         f"whether the response to t = {stretch.begin:.4g} s settles is not judged: {shown_name(swing.name)} swings by "
         f"about {amplitude:.3g} {unit} at {_end(stretch)}, at no single frequency, but {why}; "
-        f"{_remedy(enough)}"
+        f"{remedy_of(enough)}"
     )
     place, figures = _place(swing.name), {"amplitude": amplitude}
     return Finding(

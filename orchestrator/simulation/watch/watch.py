@@ -18,7 +18,7 @@ from orchestrator.simulation.watch.finding import (
     UNSTABLE,
     Finding,
     Kind,
-    go_on_to,
+    remedy_of,
     rounded_up,
 )
 from orchestrator.simulation.watch.interruptions import interruption_signals, interruptions
@@ -77,10 +77,9 @@ def too_short(stretches: Sequence[Stretch]) -> list[Finding]:
     )
     last = stretches[-1]
     enough = rounded_up(last.begin + SETTLING) if last.last else None
-    remedy = "give the events more distance" if enough is None else go_on_to(enough)
     message = (
         f"whether the response settles is not judged {spans}: what an event excites may still decay after less than "
-        f"{SETTLING:g} s; {remedy}"
+        f"{SETTLING:g} s; {remedy_of(enough)}"
     )
     until = None if last.last else last.end
     return [Finding("not_judged", stretches[0].begin, "", "", message, until, enough=enough)]

@@ -27,7 +27,7 @@ from orchestrator.studies.coordinated_design.words import (
     what_it_rests_on,
 )
 from orchestrator.studies.pod_design.closed_loop import PodSetting
-from orchestrator.studies.pod_design.view import parameter_file_path
+from orchestrator.studies.pod_design.view import COMMAND, parameter_file_path
 
 _ROWS = 12
 
@@ -383,7 +383,7 @@ def provenance(design: PointsDesign, command: str) -> list[str]:
     return [
         f"POD controllers for {plan.case.name}, scenario {plan.prepared.name}, designed over {len(design.points)} "
         "operating points and outages",
-        f"command: {command}",
+        f"{COMMAND}{command}",
         verdict_sentence(design.verdict).replace("\n", " "),
         "K in pu of the converter's rating, T_S1 and T_S2 in s",
     ]

@@ -25,6 +25,11 @@ from orchestrator.studies.pod_design.lead_lag import LeadLag, angle_deg
 from orchestrator.studies.pod_design.margins import Margins
 from orchestrator.studies.pod_design.sheet import mode_text, percent, remarks, verdict
 
+COMMAND = "command: "
+"""How the line of a parameter file begins that holds the command which made it."""
+OUTCOME = "with it: "
+"""How its line begins that tells the mode with the controller."""
+
 
 class ControllerDesign(NoTruth, ask=".met"):
     """A POD controller, and the closed loop with it. `Case.design` makes it.
@@ -229,9 +234,9 @@ def provenance(d: PodDesign, command: str) -> list[str]:
         how += ", with a better gain than the equations'"
     return [
         f"{DAMPING_CONTROLLERS[d.request.controller]} for {d.case}, {how}",
-        f"command: {command}",
+        f"{COMMAND}{command}",
         f"scenario {d.target.scenario}, mode {d.mode_name} without the controller: {mode_text(d.initial)}",
-        f"with it: {mode_text(d.achieved)}; required: {percent(d.required_damping)} ({'met' if d.met else 'not met'})",
+        f"{OUTCOME}{mode_text(d.achieved)}; required: {percent(d.required_damping)} ({'met' if d.met else 'not met'})",
         "K in pu of the converter's rating, T_S1 and T_S2 in s",
         *d.target.remarks,
     ]

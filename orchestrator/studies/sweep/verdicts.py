@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from orchestrator.linear.spectra.mode_tracking import ModeSet
-from orchestrator.linear.spectra.modes import damping_percent, mode_in_words
+from orchestrator.linear.spectra.modes import damping_percent, mode_in_words, shares_of_components
 from orchestrator.output.report.verdict_sentence import VerdictSentence
 from orchestrator.studies.sweep.axes import Axis, grid_places
 from orchestrator.studies.sweep.sweep import ScenarioSweep, SweepResult
@@ -68,13 +68,8 @@ def _least(sweep: ScenarioSweep, axes: Sequence[Axis]) -> str:
     if found is None:
         return ""
     place, modes, k = found
-    shares: dict[str, float] = {}
-    for name, factor in zip(modes.names, modes.participation()[k], strict=True):
-        component = name.partition(".")[0]
-        shares[component] = shares.get(component, 0.0) + float(factor)
-    told = mode_in_words(
-        complex(modes.eigenvalues[k]), sorted(shares.items(), key=lambda entry: -entry[1])
-    )
+    shares = shares_of_components(zip(modes.names, modes.participation()[k].tolist(), strict=True))
+    told = mode_in_words(complex(modes.eigenvalues[k]), shares.items())
     return f"; least damping at {place_text(axes, place)}: {told}"
 
 
